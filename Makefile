@@ -24,8 +24,8 @@ $(VENV)/.installed: pyproject.toml constraints.txt fuzz/pyproject.toml throughpu
 report: install
 	$(BIN)/proofroll report --out $(OUT) $(REPORT)
 
-# Every test but drills, those that take more than 1 s of processor, of which none may be there without its mark;
-# `make test MARK=` runs all.
+# Every test but drills: those that take more than 1 s of processor, of which none may be there without its mark, and
+# most above a quarter of a second. `make test MARK=` runs all.
 MARK ?= not drill
 drills: MARK = drill and not nightly
 test drills: install

@@ -44,6 +44,7 @@ def swing(gravity: float = 9.81) -> dict[str, np.ndarray]:
     return {"time": times, "q.pivot": found.y[0]}
 
 
+@pytest.mark.drill
 def test_an_engine_that_agrees_says_what_was_found() -> None:
     """An engine by its name agrees, and the answer has error, tolerance and the truth's error bar."""
     found = assert_agrees("pendulum", "projection", tolerance={"positions": "1e-3 m"}, because=BECAUSE, until=0.2)
@@ -64,6 +65,7 @@ class Drifting(Tiny):
         return BallSample(right.p_WB + np.array([0, 0, 0.01 * self.t]), right.v_WB, right.w_WB, force=right.force)
 
 
+@pytest.mark.drill
 def test_what_differs_is_told_with_numbers() -> None:
     """A class needs no entry point; of one that is wrong the message says what, how much, when, and the bounds."""
     scene = proofroll.load_scene("sphere_in_cylinder")
@@ -83,12 +85,15 @@ def test_an_engine_that_is_built_already() -> None:
     assert_agrees(scene, built, tolerance="1e-3 m", because=BECAUSE, until=0.1)
 
 
+@pytest.mark.drill
 def test_a_tolerance_below_the_truths_own_bar_passes_nothing() -> None:
     """Where the truth is not known well enough nobody agrees, and the message says how well it is known."""
     with pytest.raises(AssertionError, match="not judged, for the truth is known to"):
         assert_agrees("pendulum", "truth", tolerance={"positions": "1e-30 m"}, because=BECAUSE, until=0.1)
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -107,6 +112,7 @@ def test_what_makes_no_sense_is_one_line(change: dict[str, Any], words: str) -> 
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.drill
 def test_arrays_of_ones_own_are_judged() -> None:
     """An angle over time, from anywhere, is held against the truth at its own times; a wrong gravity shows."""
     assert proofroll.judge(swing(), "pendulum", "1e-6 rad", because=BECAUSE).agrees
@@ -117,6 +123,7 @@ def test_arrays_of_ones_own_are_judged() -> None:
     assert "q.pivot is off by" in str(wrong)
 
 
+@pytest.mark.drill
 def test_the_state_alone_is_enough() -> None:
     """From place, velocity and spin of a ball everything else follows, as it does for an engine."""
     run = proofroll.simulate(proofroll.load_scene("sphere_in_cylinder"), "projection", until=0.2, every=0.02)
@@ -131,6 +138,8 @@ def state_of(scene: str, **change: Any) -> dict[str, Any]:
     return state | {name: how(state[name]) for name, how in change.items()}
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("v_WB-sphere_in_cylinder")
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "pendulum"])
 @pytest.mark.parametrize("name", ["v_WB", "w_WB"])
@@ -143,6 +152,7 @@ def test_velocities_that_are_given_are_judged(scene: str, name: str) -> None:
         assert name in [item.judgement.observable for item in found.compared if not item.agrees]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("scene", "change", "words"),
     [
@@ -163,6 +173,7 @@ def test_a_state_that_is_none(scene: str, change: dict[str, Any], words: str) ->
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.drill
 def test_quaternions_of_the_other_sign_are_the_same() -> None:
     """Turned by -q as by q, whether alone or with the state, and from any sample on."""
     given = state_of("pendulum", q_WB=lambda q: q * np.where(np.arange(11) % 3, -1.0, 1.0)[:, None, None])
@@ -171,6 +182,7 @@ def test_quaternions_of_the_other_sign_are_the_same() -> None:
         assert proofroll.judge(run, "pendulum", {"q_WB": 1e-3}).agrees
 
 
+@pytest.mark.drill
 def test_a_file_that_run_wrote_knows_its_scene(tmp_path: Path) -> None:
     """`judge FILE` alone takes scene and parameters from the file; of one without it asks for the scene."""
     path = str(tmp_path / "run.nc")
@@ -182,6 +194,8 @@ def test_a_file_that_run_wrote_knows_its_scene(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["judge", str(other)]).exit_code != 0
 
 
+@pytest.mark.drill
+@pytest.mark.nightly_of("sphere_in_cylinder")
 @pytest.mark.drill_of("sphere_in_cylinder")
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "pendulum"])
 def test_a_run_of_which_variables_were_left_out(scene: str, tmp_path: Path) -> None:
@@ -200,6 +214,8 @@ def test_a_run_of_which_variables_were_left_out(scene: str, tmp_path: Path) -> N
         }
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "double_pendulum"])
 def test_a_table_of_numbers(command_line: Proofroll, scene: str, tmp_path: Path) -> None:
     """What run writes as CSV has every number over time under its name and unit, and is judged as the run is."""
@@ -279,6 +295,7 @@ def test_rows_of_separators_alone_are_no_samples(tmp_path: Path) -> None:
     assert readings[0] == readings[1]
 
 
+@pytest.mark.drill
 def test_bodies_in_another_order(tmp_path: Path) -> None:
     """Bodies of a file stand in the order of the scene, or are told to."""
     run = proofroll.simulate("double_pendulum", "projection", until=0.1)
@@ -289,6 +306,7 @@ def test_bodies_in_another_order(tmp_path: Path) -> None:
             proofroll.judge(file, "double_pendulum")
 
 
+@pytest.mark.drill
 def test_reactions_of_a_file_are_judged(tmp_path: Path) -> None:
     """A CSV of a run is judged with its forces and moments, as the run itself is, and a wrong one differs."""
     run = proofroll.simulate("pendulum", "pinocchio", until=0.1)
@@ -322,6 +340,7 @@ def test_a_file_that_was_cut_off(tmp_path: Path) -> None:
             proofroll.judge(str(part), "pendulum")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("run", "words"),
     [
@@ -368,6 +387,7 @@ def test_units_are_those_of_the_truth(name: str, unit: str, words: str) -> None:
         assert "\n" not in str(caught.value)
 
 
+@pytest.mark.drill
 def test_what_is_not_judged_is_named() -> None:
     """What the truth does not have, what has no tolerance, and what the state says already, each with its reason."""
     own = swing()
@@ -469,6 +489,7 @@ def test_what_is_no_engine(given: object) -> None:
         build(load_scene("pendulum"), given)
 
 
+@pytest.mark.nightly
 def test_the_orientation_of_a_ball_that_nobody_asked_for() -> None:
     """An orientation that an engine gives of a ball is judged, whether the scene asks for it or not."""
     scene = load_scene("sphere_in_cylinder")
@@ -479,6 +500,8 @@ def test_the_orientation_of_a_ball_that_nobody_asked_for() -> None:
     assert [item.judgement.observable for item in frozen.compared if not item.agrees] == ["q_WB"]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["stop", "pendulum_friction"])
 def test_a_mechanism_that_switches_is_judged(name: str) -> None:
     """A run of a mechanism whose truth has events is judged, though no run of a mechanism tells any."""

@@ -36,6 +36,8 @@ def broken(tmp_path: Path) -> dict[str, str]:
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.nightly_of("words2-ball.x", "words3-is sound")
 @pytest.mark.parametrize(
     ("words", "shown"),

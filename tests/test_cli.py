@@ -136,6 +136,7 @@ BAD = {
 }  # fmt: skip
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of("dt of zero", "unknown setting")
 @pytest.mark.parametrize(("arguments", "code", "words"), BAD.values(), ids=BAD.keys())
 def test_bad_input(proofroll: Proofroll, arguments: list[str], code: int, words: list[str]) -> None:
@@ -161,6 +162,7 @@ def test_broken_toml(proofroll: Proofroll, tmp_path: Path) -> None:
         assert "line 1" in err
 
 
+@pytest.mark.drill
 def test_an_engine_that_hangs(proofroll: Proofroll) -> None:
     """A hang ends at the time limit, as a crash of the engine."""
     code, out, err = proofroll(*with_option("--engine", "hangs"), "--time-limit", "2", "--json")
@@ -169,6 +171,7 @@ def test_an_engine_that_hangs(proofroll: Proofroll) -> None:
     assert json.loads(out)["status"] == "timeout"
 
 
+@pytest.mark.drill
 def test_run_json(proofroll: Proofroll) -> None:
     """``run --json`` prints one document with the promised keys, and nothing else anywhere."""
     code, out, err = proofroll(*RUN, "--set", "speed=5", "--json")
@@ -188,6 +191,7 @@ def test_run_json(proofroll: Proofroll) -> None:
     assert found["smallest"]["N"] == pytest.approx(0.517 * 25 / 0.2)
 
 
+@pytest.mark.drill
 def test_run_of_the_truth(proofroll: Proofroll) -> None:
     """The truth is an engine too, and gives its error bars."""
     code, out, _ = proofroll(*with_option("--engine", "truth"), "--json")
@@ -250,6 +254,8 @@ def test_scenes(proofroll: Proofroll) -> None:
     assert found["sphere_in_cylinder"]["parameters"]["speed"]["unit"] == "m/s"
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("proofroll compare pap-2-paper")
 @pytest.mark.drill_of("proofroll run bric-2-bricard")
 @pytest.mark.parametrize(
@@ -269,7 +275,7 @@ def test_completion(words: str, index: int, found: str) -> None:
     assert done.stdout.split() == [found]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_scene_says_which_step_suits_it(proofroll: Proofroll) -> None:
     """A run that fails with a longer step than the scene asks for names the engine with that step, which works."""
     code, _, err = proofroll("run", "andrews_squeezer", "--engine", "exudyn", "--json")
@@ -331,7 +337,8 @@ tolerance = "tight"
 """
 
 
-@pytest.mark.nightly_of("exits-3")
+@pytest.mark.drill
+@pytest.mark.nightly_of("exits-3", "absent-3")
 @pytest.mark.drill_of("tiny-1")
 @pytest.mark.parametrize(("engine", "code"), [("tiny", 1), ("exits", 3), ("absent", 3)])
 def test_compare(proofroll: Proofroll, tmp_path: Path, engine: str, code: int) -> None:
@@ -363,7 +370,7 @@ def test_compare_on_a_full_disk(tmp_path: Path) -> None:
     assert not done.stdout
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_compare_keeps_reuses_and_mends_results(proofroll: Proofroll, tmp_path: Path) -> None:
     """A second comparison runs nothing and says the same; changed results are made again, and a line says so."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
@@ -390,7 +397,7 @@ def test_compare_restricted_to_an_engine(proofroll: Proofroll, tmp_path: Path) -
     assert "there is no such engine; choose one of" in err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_engine_that_is_asked_for_has_a_row(proofroll: Proofroll, tmp_path: Path) -> None:
     """An engine without a row in the file, also one with settings, has a verdict or a reason; nothing is dropped."""
     (tmp_path / "claim.toml").write_text(COMPARISON.replace("ENGINE", "oracle"))
@@ -415,6 +422,7 @@ def test_an_engine_of_a_report_without_a_row(proofroll: Proofroll, tmp_path: Pat
     assert err.count(said) == 1
 
 
+@pytest.mark.drill
 @pytest.mark.nightly_of("exits")
 @pytest.mark.parametrize("engine", ["absent", "exits"])
 def test_an_engine_that_fails_in_a_first_look(proofroll: Proofroll, tmp_path: Path, engine: str) -> None:
@@ -467,7 +475,7 @@ EARLY = ["paper", "onset", "sphere_in_cylinder", "--set", "mu_static=0.12", "--u
 LOCATING = "pinocchio[formulation=impulses,preset=tuned]"  # in steps of 1e-3 s
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_run_lists_events(proofroll: Proofroll) -> None:
     """With bounded friction ``run --json`` lists each slip and stick with its time and its bracket."""
     code, out, err = proofroll(
@@ -482,6 +490,8 @@ def test_run_lists_events(proofroll: Proofroll) -> None:
         assert event["time_low"] <= event["time"] <= event["time_high"] < event["time_low"] + 1.1e-3
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.nightly_of("pinocchio[formulation=impulses,preset=tuned]-0-agree-done")
 @pytest.mark.parametrize(
     ("engine", "code", "verdict", "status"),
@@ -512,6 +522,8 @@ def test_onset(proofroll: Proofroll, tmp_path: Path, engine: str, code: int, ver
         assert abs(row["difference"]) < 1e-3
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("soon", "reached"), [(None, "reached 0.17 s"), (0.05, "reached 0.2 s")])
 def test_onset_ends_soon_after_the_slip(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, soon: float | None, reached: str
@@ -582,6 +594,7 @@ mu_static = { low = 0.05, high = 0.8, count = 3 }
 """
 
 
+@pytest.mark.drill
 def test_regimes(proofroll: Proofroll, tmp_path: Path) -> None:
     """A map of 3 x 3 runs is printed as one JSON document, the same that is written beside the picture."""
     (tmp_path / "map.toml").write_text(MAP)
@@ -667,6 +680,7 @@ def test_a_poor_output(shell: str, shown: str) -> None:
     assert shown in done.stdout
 
 
+@pytest.mark.drill
 def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
     """One JSON document with the boundaries of every point; the map and the programs lie beside the cases."""
     file = tmp_path / "made.toml"
@@ -704,7 +718,7 @@ def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "projection solver rotating frame, default" in text
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_reader_that_stops_reading() -> None:
     """Output into a pipe that is closed early, as by head, is no error, while a command writes or at its end."""
     for words in ("scenes --json", "scenes", "--version"):
@@ -716,6 +730,7 @@ def test_a_reader_that_stops_reading() -> None:
         assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.drill
 def test_a_width_of_nothing(command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch) -> None:
     """COLUMNS=0, as some shells say of a window of unknown size, is taken for 80."""
     shown = {}
@@ -726,6 +741,7 @@ def test_a_width_of_nothing(command_line: Callable[..., tuple[int, str, str]], m
     assert shown["0"][1].strip()
 
 
+@pytest.mark.drill
 def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--ask orientation`` makes an engine follow it that otherwise would not."""
     from proofroll.files.trajectory_file import read

@@ -98,7 +98,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("out")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_report_of_several_studies(proofroll: Proofroll, tmp_path: Path, out: Path) -> None:
     """Stages on standard error, tables and the place on standard output, and both files with what they name."""
     names = files(tmp_path, claim=COMPARISON, figures=FIGURES.replace("STATED", "-160"))
@@ -207,6 +207,7 @@ def test_progress_counts_comparisons(proofroll: Proofroll, tmp_path: Path, monke
     assert (ended.count(2), ended[-1]) == (1, 2), "with the last case of the second"
 
 
+@pytest.mark.drill
 def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) -> None:
     """A file for another study, and a name that does not exist, are wrong usage before anything runs."""
     for name in (*files(tmp_path, other='study = "opinion"', list='study = ["a"]'), "nothing"):
@@ -250,7 +251,7 @@ def test_a_page_after_the_first_comparison(
     assert "left out: 1 (balls 1). proofroll report --budget 3600 runs all" in " ".join(said.split())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_budget_is_spent_briefly_first_and_grows(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -308,7 +309,7 @@ def test_a_used_budget_begins_no_further_study(
     assert "the budget is used" in whole((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_second_report_into_one_folder(tmp_path: Path) -> None:
     """While a report is being made in a folder, another one says so and waits."""
     asked = [sys.executable, "-m", "proofroll", "report", "inclined_plane", "--out", str(tmp_path)]
@@ -347,6 +348,7 @@ def test_a_planted_change_of_one_per_cent_is_found_and_nothing_else(
     assert "error of" in " ".join(out.split())
 
 
+@pytest.mark.drill
 def test_only_some_groups_of_scenes_are_run(proofroll: Proofroll, tmp_path: Path) -> None:
     """--only takes the comparisons of these groups, by name or by a word of it; others are one line of advice."""
     text = COMPARISON.replace("sphere_in_cylinder", "four_bar").replace("vary = { speed = [4] }", "")
@@ -360,7 +362,7 @@ def test_only_some_groups_of_scenes_are_run(proofroll: Proofroll, tmp_path: Path
     assert _of_groups([claim, other], "ball rolling") == [claim]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_each_scene_is_searched_for_the_first_screen(proofroll: Proofroll, tmp_path: Path) -> None:
     """Page, terminal and JSON have one sentence from one record, which recommend and compare find and print, too."""
     given = ["double_pendulum", "--engine", "mujoco", "--out", str(tmp_path)]

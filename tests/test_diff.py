@@ -30,6 +30,7 @@ def run(proofroll: Proofroll, folder: Path) -> Callable[..., Path]:
     return written
 
 
+@pytest.mark.drill
 def test_equal_runs_have_the_same_bits(proofroll: Proofroll, run: Callable[..., Path]) -> None:
     """A run and the same run in another format and file differ in nothing; exit 0."""
     one, same = (run(f"run.{ending}", "--engine", "mujoco") for ending in ("nc", "npz"))
@@ -37,6 +38,7 @@ def test_equal_runs_have_the_same_bits(proofroll: Proofroll, run: Callable[..., 
     assert (code, out) == (0, "Both runs of pendulum have the same bits at 41 instants.\n")
 
 
+@pytest.mark.drill
 def test_another_step_is_named_with_its_numbers(proofroll: Proofroll, run: Callable[..., Path], tmp_path: Path) -> None:
     """Runs of two steps differ at the instants that both have; the setting and each quantity are told, exit 1."""
     coarse = run("coarse.nc", "--engine", "mujoco[dt=2e-2]", "--every", "0.02")
@@ -52,7 +54,7 @@ def test_another_step_is_named_with_its_numbers(proofroll: Proofroll, run: Calla
     assert "- settings.dt: 0.02 → 0.01\n" in comment.read_text(encoding="utf-8")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_events_of_two_engines_are_compared(proofroll: Proofroll, run: Callable[..., Path]) -> None:
     """Of runs of a scene with contact the number and the times of events are told."""
     truth = run("truth.nc", "--engine", "truth", scene="bouncing_ball")
@@ -63,6 +65,8 @@ def test_events_of_two_engines_are_compared(proofroll: Proofroll, run: Callable[
     assert not any(name.startswith("settings") for name in told["about"]), "settings of two engines have no meaning"
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

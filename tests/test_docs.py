@@ -89,7 +89,7 @@ def typed() -> set[str]:
     return set()
 
 
-@pytest.mark.daily("findings", "first_verdict", "json", "licences", "write_a_scene")
+@pytest.mark.daily("findings", "json", "licences", "write_a_scene")
 @pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])

@@ -52,6 +52,8 @@ def arguments(tmp_path: Path) -> Callable[[str], list[str]]:
     return of
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("balance under control")
 @pytest.mark.parametrize("path", PATHS)
 def test_a_wrong_setting_is_told_alike(
@@ -65,6 +67,7 @@ def test_a_wrong_setting_is_told_alike(
             assert word in err
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "balance under control",
     "comparison of a file",
@@ -88,6 +91,7 @@ def test_a_step_in_brackets_is_the_one_that_is_taken(
     assert steps or ENGINE in out
 
 
+@pytest.mark.drill
 def test_a_map_of_stability_takes_no_step(command_line: Proofroll) -> None:
     """A step in brackets is refused where it is what the map looks for."""
     code, _, err = command_line("stability", "pendulum", "--engine", ENGINE)

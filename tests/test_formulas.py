@@ -22,6 +22,8 @@ def formulas(page: Path) -> list[str]:
 PAGES = [page for page in sorted(DOCS.glob("*.md")) if formulas(page)]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("method")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_formulas_of_a_page_are_drawn(page: Path) -> None:

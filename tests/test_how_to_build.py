@@ -34,6 +34,8 @@ def run(text: str, folder: Path) -> xr.Dataset:
     return simulate(load_scene(str(folder)), "projection", until=0.5, every=0.1)
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("name", "accelerations"),
     [
@@ -53,6 +55,7 @@ def test_a_scene_of_the_page_has_its_closed_form(name: str, accelerations: dict[
         assert float(coordinate.attrs["error_bar"]) < 1e-10
 
 
+@pytest.mark.drill
 def test_the_force_of_a_coupling_is_that_on_one_joint(tmp_path: Path) -> None:
     """It acts on joint_b of a ratio and on the first of several joints, as the page about torques says."""
     forces = {"belt": ("coupling.belt", 0.08 * 50), "tackle": ("coupling.rope", 4 * 0.8 * _G)}
@@ -70,7 +73,7 @@ def test_a_parcel_slides_on_a_conveyor(tmp_path: Path) -> None:
     assert float(dataset["middle.x"][-1]) == pytest.approx(0.3 * _G * 0.05**2 / 2, rel=1e-9)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_sleeve_without_mass_swings_and_turns(tmp_path: Path) -> None:
     """The rotor swings along the axis as on the spring alone, about the place where it holds the weight."""
     found = run(SCENES["sleeve"], tmp_path)
@@ -81,6 +84,7 @@ def test_a_sleeve_without_mass_swings_and_turns(tmp_path: Path) -> None:
     assert np.abs(found["drive.turn"].to_numpy() - moment).max() < 1e-10
 
 
+@pytest.mark.nightly
 def test_an_arm_without_mass_carries_its_force_alone(tmp_path: Path) -> None:
     """What the ball does to the arm is what the hinge does to it, and has no moment about the hinge."""
     found = run(SCENES["held_by_an_arm"], tmp_path)

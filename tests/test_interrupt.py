@@ -72,7 +72,7 @@ def test_while_an_engine_is_asked(
     assert err.count("\n") == 1
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_while_the_map_is_drawn(tmp_path: Path) -> None:
     """Processes that compute for the truth end with Ctrl-C as well, and none of them says anything."""
     code, out, err = interrupted(
@@ -121,6 +121,8 @@ main()
 """
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("proofroll.files.scene_file-2")
 @pytest.mark.parametrize(
     ("module", "number"),
@@ -140,6 +142,8 @@ def test_a_signal_while_a_module_is_imported(module: str, number: int) -> None:
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.nightly_of("arguments1")
 @pytest.mark.drill_of("arguments0")
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no /dev/full")

@@ -104,6 +104,8 @@ def fields(title: str) -> set[str]:
     return set(re.findall(r"^\| `(\w+)` \|", section(title), flags=re.MULTILINE))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("check-study", "ladder", "engines")
 @pytest.mark.drill_of("compare")
 @pytest.mark.parametrize(
@@ -145,6 +147,7 @@ def test_fields(
         assert set(item) - without == fields(title)
 
 
+@pytest.mark.drill
 def test_a_robot_file(proofroll: Proofroll, tmp_path: Path) -> None:
     """The document about a robot file has each field of its table, and the table each of the document."""
     robot = tmp_path / "arm.urdf"

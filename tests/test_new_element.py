@@ -120,7 +120,7 @@ def test_run(command_line: Proofroll, springs: Path) -> None:
     assert ends["sprung"] == pytest.approx(ends["truth"], abs=1e-4)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.usefixtures("springs")
 def test_compare(command_line: Proofroll) -> None:
     """Compare judges every observable of the new kind."""
@@ -162,7 +162,7 @@ def test_ladder(command_line: Proofroll, springs: Path) -> None:
     assert [rung["engine"] for rung in json.loads(out)["rungs"] if rung["engine"]] == ["sprung"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.usefixtures("springs")
 def test_report(command_line: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
     """Report writes a page about it, of results that are stored."""
@@ -172,6 +172,7 @@ def test_report(command_line: Proofroll, monkeypatch: pytest.MonkeyPatch) -> Non
     assert "A mass on a spring" in Path("out", "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("springs")
 def test_conformance() -> None:
     """Every check of its engine holds, on the scenes of the new kind."""
@@ -198,7 +199,7 @@ def test_other_kinds_keep_their_units(command_line: Proofroll, monkeypatch: pyte
     assert code == 0, err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_replay_and_judge(command_line: Proofroll, springs: Path) -> None:
     """A run of a scene that is no scene of the package is held against its truth; who draws no such scene says so."""
     assert command_line("run", str(springs), "--engine", "sprung", "--until", "1", "--out", "run.nc")[0] == 0

@@ -59,6 +59,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("readme")
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("line", sorted(COMMANDS))

@@ -64,7 +64,7 @@ def versions(
     return run
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     """Verdicts, refusals, orders and defaults, as between two reports; a verdict that changed is exit code 1."""
     comment = tmp_path / "changes.md"
@@ -90,6 +90,8 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     assert "| change | run |" in comment.read_text(encoding="utf-8")
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

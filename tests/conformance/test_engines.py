@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from proofroll.conformance import Check, checks
-from proofroll.conformance.subject import scenes, truth_scenes
+from proofroll.conformance.subject import contrasts, scenes, truth_scenes
 from proofroll.core.errors import Missing
 from proofroll.core.plugins import engine_names, load_engine
 
@@ -44,9 +44,10 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
 # What a formulation builds hangs on no preset: it is asked of one.
 OF_BUILDING = ("builds_or_refuses", "builds_only_what_is_required")
 # Of what hangs on a formulation's model or adapter, not on its step, and of what is held against truths, one preset is
-# asked on every scene in every run of the tests; in the drills each scene is asked of one other preset, in turns: of
-# how it moves, or of its certificate and its first steps; an eighth of them before a change lands, another eighth by
-# each check, and that a law acts in other presets at night alone. What is known to fail is asked wherever it is.
+# asked on every scene: of its certificate in every run of the tests, of its first steps, of how it moves and whether a
+# law acts on a third of them, in turns, and at night on all. In the drills each scene is asked of one other preset, in
+# turns, too: of how it moves, or of its certificate and its first steps; a twenty-fourth of them before a change lands,
+# another by each check, and all else of other presets at night alone. What is known to fail is asked wherever it is.
 OF_MODELS = (
     "certificate_holds",
     "first_steps_fit_the_scene",
@@ -61,36 +62,61 @@ OF_MODELS = (
     "sampling_changes_nothing",
     "velocities_are_the_rates",
 )
-# Each preset's order and the effect of its tolerance: of one in every run, of all others in the drills.
+# Each preset's order and the effect of its tolerance: of one in every run, of all others at night.
 OF_PRESETS = ("order_is_as_declared", "tolerance_has_an_effect")
+# Those of a formulation's model that run for long: each is asked of a third of the scenes before a change lands.
+OF_RUNS = ("first_steps_fit_the_scene", "moves_as_the_truth", "law_acts")
+_SHARE = 3
 
 
 TURNS = [*scenes(), *truth_scenes()]
 
 
+def first_marks(engine: Any, check: Check, name: str, formulation: str, scene: str) -> tuple[pytest.MarkDecorator, ...]:
+    """The mark of a check of a formulation's first preset; ``scene`` is empty for one without."""
+    if name not in OF_RUNS or check.known:
+        return ()
+    places = [*TURNS, *contrasts()].index(scene), sorted(engine.presets).index(formulation), OF_RUNS.index(name)
+    return (pytest.mark.nightly,) if sum(places) % _SHARE else ()
+
+
+def further_mark(engine: Any, name: str, formulation: str, preset: str, scene: str) -> pytest.MarkDecorator | None:
+    """The mark of a check of another preset than the first one; None: it is left to a third preset, or to no one."""
+    if name in OF_BUILDING:
+        return None
+    if name in OF_PRESETS:
+        return pytest.mark.nightly
+    number = turn = OF_MODELS.index(name)
+    nightly = True
+    if scene in TURNS:
+        turn, odd = divmod(TURNS.index(scene), 2)
+        if odd == (name == "moves_as_the_truth"):
+            return None
+        nightly = (turn + number) % (8 * _SHARE) > 0
+    _, *others = _presets(engine, formulation)
+    if preset != others[turn % len(others)]:
+        return None
+    return pytest.mark.nightly if nightly else pytest.mark.drill
+
+
+def _presets(engine: Any, formulation: str) -> list[str]:
+    """The presets of a formulation; first the one of which everything is asked: ``matched``, where there is one."""
+    return sorted(engine.presets[formulation], key=lambda preset: preset != "matched")
+
+
 def marks(engine: Any, check: Check) -> tuple[pytest.MarkDecorator, ...] | None:
-    """The mark of a check that repeats another preset's; none at all: nobody asks it."""
+    """The mark of a check that repeats another preset's or another scene's; none at all: nobody asks it."""
     name, _, about = check.name.removesuffix("]").partition("[")
     if name not in {*OF_BUILDING, *OF_MODELS, *OF_PRESETS}:
         return ()
     formulation, preset, *scene = about.split("-", 2)
-    first, *others = sorted(engine.presets[formulation], key=lambda preset: preset != "matched")
-    if preset == first:
-        return ()
-    if name in OF_BUILDING and not check.known:
-        return None
-    if check.known or name in OF_PRESETS:
+    of_scene = scene[0] if scene else ""
+    if preset == _presets(engine, formulation)[0]:
+        return first_marks(engine, check, name, formulation, of_scene)
+    if check.known:
         return (pytest.mark.drill,)
-    number = turn = OF_MODELS.index(name)
-    mark = pytest.mark.drill
-    if scene and scene[0] in TURNS:
-        turn, odd = divmod(TURNS.index(scene[0]), 2)
-        if odd == (name == "moves_as_the_truth"):
-            return None
-        mark = pytest.mark.nightly if (turn + number) % 8 else mark
-    elif name == "law_acts":
-        mark = pytest.mark.nightly
-    return (mark,) if preset == others[turn % len(others)] else None
+    mark = further_mark(engine, name, formulation, preset, of_scene)
+    return mark and (mark,)
 
 
 def all_checks() -> list[Any]:

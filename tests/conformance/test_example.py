@@ -56,12 +56,14 @@ def test_the_example_is_checked_on_both_scenes() -> None:
         assert f"certificate_holds[newton_euler-default-{scene}]" in names
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("check", [*checks(SEMI_IMPLICIT), *checks(TREE_EULER)])
 def test_the_example_conforms(check: Check) -> None:
     """The example keeps a promise of the protocol."""
     check()
 
 
+@pytest.mark.drill
 def test_the_example_runs(tmp_path: Path) -> None:
     """Either runs in the example from a worker process, past the certificate and to the end."""
     cases = [

@@ -31,6 +31,8 @@ def test_a_number_that_is_read_back_is_the_cause(name: str) -> None:
     assert ";" not in found.said
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("LoopAboutCentre")
 @pytest.mark.drill_of("LoopReaction")
 @pytest.mark.parametrize("name", REACTIONS)
@@ -40,6 +42,8 @@ def test_reactions_that_are_told_wrongly_at_time_0_are_named(name: str) -> None:
     assert found.named, found.said
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", ["TiltedAxis", "CentreVelocity", "Unnormalised"])
 def test_what_the_first_steps_or_the_end_of_a_run_tell_is_named(name: str) -> None:
     """An axis that the first turning shows, velocities of the centres of mass, and quaternions that grow are named."""
@@ -47,6 +51,8 @@ def test_what_the_first_steps_or_the_end_of_a_run_tell_is_named(name: str) -> No
     assert found.named, found.said
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "name",
     [
@@ -83,6 +89,7 @@ class SilentBall(Mutant):
         )
 
 
+@pytest.mark.drill
 def test_three_free_numbers_do_not_explain_two() -> None:
     """A ball whose friction and first steps show a little more inertia is not accused of another gravity."""
     found = tried(SilentBall)

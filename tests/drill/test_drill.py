@@ -122,6 +122,7 @@ proofroll.running.process_end.end_with_pipe = lambda pipe: None
 }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("taken_out", "drill", "problem"),

@@ -7,6 +7,7 @@ import pytest
 from proofroll_drill.law_faults import FAULTS, SCENES, LawFault, honest, outcome
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("motors", "slide", "plate")
 @pytest.mark.drill
 @pytest.mark.parametrize("scene", SCENES)
@@ -22,6 +23,7 @@ _CASES = [
 ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize("fault", _CASES)
 def test_a_shared_fault_is_not_silent(fault: LawFault) -> None:

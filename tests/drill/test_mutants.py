@@ -56,6 +56,8 @@ NIGHTLY = pytest.mark.nightly
 QUICK = {"sphere_in_cylinder", "two_bounces", "double_pendulum", "heavy_top", "free_body", "saturated_servo"}
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "kind",
     [
@@ -70,6 +72,7 @@ def test_an_engine_without_a_fault_is_not_detected(kind: type[Mutant]) -> None:
     assert [item for item in judged_without_fault(kind) if item.error > 2e-3 * item.scale] == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("fault", [pytest.param("PyramidForCone", marks=pytest.mark.drill), "FrictionOfOneFoot"])
 def test_a_fault_of_contacts_is_detected_and_named(fault: str) -> None:
@@ -79,6 +82,8 @@ def test_a_fault_of_contacts_is_detected_and_named(fault: str) -> None:
     assert found.named, found.said
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("RoughJoint", "CoarseGear")
 @pytest.mark.parametrize(
     "fault", ["RoughJoint", "PushingJoint", "TightClamp", "SwappedGains", "UndampedServo", "InverseGear", "CoarseGear"]
@@ -91,6 +96,7 @@ def test_a_law_of_joints_that_is_another_is_named(fault: str) -> None:
     assert found.named, found.said
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("scene", [pytest.param("gyroscope_cart", marks=pytest.mark.drill), "heavy_top"])
 def test_late_reactions_of_a_fast_rotor_are_named(scene: str) -> None:
     """Reactions of the step before are named where they change little, beside errors of the step that change less."""
@@ -98,6 +104,8 @@ def test_late_reactions_of_a_fast_rotor_are_named(scene: str) -> None:
     assert found.named, found.by
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("scene", "parameters", "until"),
     [
@@ -192,7 +200,7 @@ def test_a_jump_a_moment_later_is_no_other_clock() -> None:
     ]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_ball_that_jumps_is_not_told_of_gravity() -> None:
     """A soft contact that throws the ball off the wall again and again has neither gravity nor a pyramid to blame."""
     scene = load_scene("slide_to_roll", speed=2.0, back_spin=400.0)

@@ -41,6 +41,7 @@ def test_a_number_that_is_off_misses(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert [row.misses for row in published.held([])] == [True, False, True, False, True]
 
 
+@pytest.mark.drill
 def test_a_series_misses_by_its_worst_instant() -> None:
     """A table of a scene is held at all its times; its row names the value that is a last digit too far off."""
     table = {"source": "closed form", "times": [0.5, 1.0], "q.thread.slide": [-0.24525, -0.9822]}

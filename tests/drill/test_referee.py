@@ -37,6 +37,7 @@ def starts(mechanism: Mechanism) -> list[Record]:
     return [record_of(np.zeros(1), [first.sample(*mechanism.start())]), MaximalCoordinates(mechanism).at_start()]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("seed", STARTS)
 def test_both_routes_start_where_the_joints_definition_says(seed: int) -> None:
     """Poses, velocities, energy and determinate reactions at t = 0, all frames turned, by formulas of its own."""
@@ -48,6 +49,7 @@ def test_both_routes_start_where_the_joints_definition_says(seed: int) -> None:
         assert max(found[name][0] for name in ("energy", "wrench")) < 1e-10
 
 
+@pytest.mark.drill
 def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
     """Kinds that start above leave none out; planar ones are planar to the second route, loops are loops."""
     found = {style: [random_mechanism(seed)[1] for seed in STARTS if seed % 4 == k] for k, style in enumerate(STYLES)}
@@ -58,6 +60,8 @@ def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
         assert not turning or {type(body) for body in made_bodies(mechanism, allow_planar=True)} == {Planar}
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.drill_of("5", "10")
 @pytest.mark.parametrize("seed", [5, 10, 3060])
 def test_no_error_of_a_truth_lies_beyond_its_bar(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,6 +119,7 @@ def test_a_ball_starts_where_the_coordinates_of_its_wall_say(seed: int) -> None:
     assert abs(referee.run(np.zeros(1, np.longdouble)).seen[0]["gap"]) < 1e-17
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("7017", "17", "7092")
 # A bowl on which the ball slips until it sticks, a torus with resistance, a plane on which it bounces, two tori on
 # which it slips at first (it was taken to leave them), a plane whose gap has the round-off of the place, two bowls on
@@ -136,7 +141,7 @@ def test_random_balls_have_every_wall_and_every_law() -> None:
     assert len(styles) == len(WALLS) * len(STYLES_OF_BALLS)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """An inertia that is a millionth too large shows in the motion."""
     element = random_ball(17)[1]
@@ -146,7 +151,7 @@ def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.nightly_of("41")
-@pytest.mark.drill
+@pytest.mark.nightly
 # An ellipsoid that lands, spheres that pass each other, a rod that lands and whose slip stops.
 @pytest.mark.parametrize("seed", [41, 52, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (27, 20018))])
 def test_no_error_of_the_truth_of_contacts_lies_beyond_its_bar(seed: int) -> None:
@@ -156,7 +161,7 @@ def test_no_error_of_the_truth_of_contacts_lies_beyond_its_bar(seed: int) -> Non
     assert {"p_WB", "v_WB", "w_WB", "q_WB", "pressed", "event"} <= set(held.worst)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_referee_of_contacts_notices_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     """An ellipsoid with an axis that is a millionth too long lands at another time."""
     style, mechanism, until = random_contacts(41)

@@ -77,7 +77,8 @@ def test_an_engine_without_a_force_at_time_0_conforms() -> None:
         assert failure(Late, family) == ""
 
 
-@pytest.mark.drill_of("Damped-first_steps_fit_the_scene")
+@pytest.mark.one_in(3)
+@pytest.mark.drill_of("Damped-first_steps_fit_the_scene", "Beating-moves_as_the_truth")
 @pytest.mark.parametrize(("engine", "family"), FAILS.items(), ids=lambda value: getattr(value, "__name__", value))
 def test_each_broken_promise_is_noticed(engine: type[Tiny], family: str) -> None:
     """The check whose business it is fails, and says how to run it alone."""
@@ -94,6 +95,8 @@ def test_a_buffer_that_is_filled_anew_is_named(engine: type[Tiny]) -> None:
     assert text.startswith("the arrays of a sample change with later steps: return copies")
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.parametrize("engine", [Views, OneBuffer, OneForAll])
 def test_a_buffer_that_is_filled_anew_spoils_no_run(engine: type[Tiny]) -> None:
     """A run of such an engine is that of one that returns copies, and its model is not called a wrong one."""
@@ -120,6 +123,7 @@ def test_no_order_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "nan" not in said
 
 
+@pytest.mark.drill
 def test_a_scale_is_named() -> None:
     """An error that is told relative to a scale names the number of the scale, and the error itself, with units."""
     text = failure(Drifting, "moves_as_the_truth")
@@ -134,7 +138,7 @@ def test_every_check_is_known_to_be_able_to_fail() -> None:
     assert {check.name.partition("[")[0] for check in checks(Tiny)} == set(FAILS.values())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_reproducer_runs() -> None:
     """The printed command, pasted into a shell, fails for the same reason."""
     check = next(check for check in checks(Forgetful) if check.name.startswith("advance_in_two_parts"))
@@ -221,6 +225,8 @@ def lying(engine: type[Any], model: Callable[[Scene], Scene]) -> type[Any]:
     return Lying
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("engine", "formulation", "lies"),
     [
@@ -238,6 +244,7 @@ def test_another_model_than_is_said_is_noticed(engine: type[Any], formulation: s
             own.run()
 
 
+@pytest.mark.drill
 def test_another_top_than_is_said_is_noticed() -> None:
     """A slow top shows a centre of mass that is off by a tenth in an engine of spherical joints and first order."""
     pytest.importorskip("mujoco")
@@ -306,6 +313,8 @@ class Exploding(Tiny):
             self.x = np.full(5, np.nan)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("engine", [Bounded, Refusing, Exploding])
 def test_the_order_of_an_engine_that_takes_no_coarse_steps(engine: type[Tiny]) -> None:
     """Where there are no steps coarser than the preset's the order is seen with finer ones, and a wrong one too."""

@@ -61,6 +61,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     }
 
 
+@pytest.mark.nightly
 def test_each_search_has_a_line_and_each_finding_one(printed: dict[str, str]) -> None:
     """The table counts what was drawn and found; below a search stand its findings, with example or seed."""
     table = printed["drill"].partition(" searches ")[2].partition("short test summary")[0].splitlines()

@@ -141,6 +141,8 @@ def band_of(about: str) -> dict[str, str]:
     return {name: "1 %" if item and item.role is Role.RESIDUAL else "0.1 %" for name, item in items.items()}
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("loop-3 ms early")
 @pytest.mark.parametrize(("about", "lie"), LIES)
 def test_a_lie(about: str, lie: Lie) -> None:
@@ -170,6 +172,7 @@ UNASKED = [
 ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("about", "name", "words"), UNASKED)
 def test_a_lie_where_nobody_says_what_is_judged(about: str, name: str, words: str) -> None:
     """Without a tolerance a lie about states or reactions is found, and events that are not judged are named."""
@@ -268,6 +271,8 @@ def _honest_scene(name: str) -> tuple[Scene, Any]:
     return scene_of(name) if name in UNTIL else load_scene(name), Jointed
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "sled-implicit_euler",
     "chain-order_1",
@@ -412,6 +417,8 @@ class Remembers(Tiny):
         self.x, self.t = self.kept[t], t
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.drill_of("Tiny-0")
 @pytest.mark.parametrize(("kind", "remarks"), [(Tiny, 0), (Remembers, 1)])
 def test_a_run_that_is_remembered(kind: type[Tiny], remarks: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -424,6 +431,8 @@ def test_a_run_that_is_remembered(kind: type[Tiny], remarks: int, monkeypatch: p
     assert sum("times as long as the timed ones" in remark for remark in found.remarks) == remarks
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("about", ALL)
 def test_places_alone(about: str) -> None:
     """Who gives places and nothing else is judged by them, right or 3 ms late."""

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 PLUGINS = Path(__file__).parents[1] / "plugins"
 TESTS = {
     "test_module.py": "import pytest\npytest.importorskip('no_such_engine')\ndef test_it(): pass\n",
@@ -17,6 +19,7 @@ TESTS = {
 }
 
 
+@pytest.mark.drill
 def test_what_is_lacking_fails_where_it_must_be_there(tmp_path: Path) -> None:
     """An engine or a browser that is lacking skips on a person's machine, and fails where no skip is allowed."""
     for name, text in TESTS.items():

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = sorted((ROOT / "examples" / "engines").iterdir())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_pytest_takes_a_package_without_our_plugins() -> None:
     """``pytest examples/engines/NAME`` needs pytest alone: no option of proofroll's own tests is asked of it."""
     options = ["-p", "no:timeout", "-p", "no:cacheprovider", "--collect-only"]

@@ -64,6 +64,7 @@ def test_the_workflow_of_platforms_asks_for_what_there_is() -> None:
 BROUGHT = {"distributed>=2025.1": "`proofroll-cluster`"}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("folder", PACKAGES)
 def test_a_package_with_a_command_fits_the_suite(folder: str) -> None:
     """It has the version and the Pythons of the suite, and asks for that version: it uses more than public names."""

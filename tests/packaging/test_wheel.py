@@ -105,7 +105,7 @@ def test_it_is_the_wheel_that_is_used(installed: Path, tmp_path: Path) -> None:
     assert {path.stem for path in (REPOSITORY / "comparisons").glob("*.toml")} >= set(names.split()) >= {"paper"}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_scenes(installed: Path, tmp_path: Path) -> None:
     """The command line finds the scenes without the repository."""
     done = python(installed, tmp_path, "-m", "proofroll", "scenes", "--json")
@@ -153,7 +153,7 @@ def test_types_are_announced(wheel: Path) -> None:
         assert "proofroll/py.typed" in archive.namelist()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_source_archive_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
     """The archive builds without the repository; its wheel has the same files, and the metadata of both are valid."""
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(tmp_path)]

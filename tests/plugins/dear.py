@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 import seldom
+from share import is_of_the_day
 
 VARIABLE = "PROOFROLL_NO_DEAR"
 # Processor time [s] above which a test is a drill (CONTRIBUTING.md), on a processor that takes LOOP [s] for the loop.
@@ -68,8 +69,9 @@ def _slowness() -> float:
 def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Marks as drills what runs at night alone, and the cases of a test that its mark ``drill_of`` names.
 
-    Cases that the mark ``nightly_of`` names run at night alone, and those that the mark ``daily`` does not name.
-    Drills of some folders get a mark besides. Where a single case is asked for, names are not compared with cases.
+    At night alone run cases that the mark ``nightly_of`` names, those that the mark ``daily`` does not name, and all
+    but the share that the mark ``one_in`` leaves to the day. Drills of some folders get a mark besides. Where a single
+    case is asked for, names are not compared with cases.
 
     Raises:
         pytest.UsageError: a mark names a case that its test has not.
@@ -79,11 +81,13 @@ def mark_drills(config: pytest.Config, items: list[pytest.Item]) -> None:
     for item in items:
         case = item.name.partition("[")[2].removesuffix("]")
         function = item.nodeid.partition("[")[0]
+        place = len(cases[function])
         cases[function].add(case)
         drills, nightly, daily = (_names(item, mark) for mark in ("drill_of", "nightly_of", "daily"))
         if names := drills | nightly | daily:
             named[function] = names
-        if case in nightly or (daily and case not in daily):
+        share = item.get_closest_marker("one_in")
+        if case in nightly or (daily and case not in daily) or (share and not is_of_the_day(place, *share.args)):
             item.add_marker("nightly")
         if case in drills or item.get_closest_marker("nightly"):
             item.add_marker("drill")

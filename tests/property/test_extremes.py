@@ -97,7 +97,7 @@ def assert_agrees(found: xr.Dataset, true: xr.Dataset, names: tuple[str, ...] = 
         assert difference < 1e-9 * size_of(true, name) + true[name].attrs["error_bar"], name
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=12)
 @given(motion=CYLINDERS, size=SIZES, mass=MASSES)
 def test_rolling(motion: dict[str, float], size: float, mass: float) -> None:
@@ -112,7 +112,7 @@ def test_rolling(motion: dict[str, float], size: float, mass: float) -> None:
             assert np.max(np.abs(level - level[0])) < 1e-10 * np.max(np.abs(level - mass * G * dataset["z"].to_numpy()))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=3)
 @given(motion=CYLINDERS, size=SIZES)
 def test_rolling_in_euler_angles(motion: dict[str, float], size: float) -> None:

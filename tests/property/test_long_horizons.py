@@ -42,6 +42,8 @@ def drift(engine: str, oscillations: int) -> tuple[float, float]:
     return max(changes), max(slips)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("projection[formulation=euler,preset=tuned]-100")
 @pytest.mark.parametrize(
     ("engine", "oscillations"),
@@ -74,6 +76,7 @@ def test_angles_stay_within_a_turn() -> None:
     assert np.all(np.abs(angles) < 3 * 2 * np.pi)
 
 
+@pytest.mark.nightly
 @needs_heyoka
 def test_without_elimination_round_off_adds_up() -> None:
     """What elimination is for: without it the same run ends with a slip hundreds of times as large."""
@@ -83,6 +86,7 @@ def test_without_elimination_round_off_adds_up() -> None:
     assert without[0] > 1e2 * with_it[0]
 
 
+@pytest.mark.drill
 def test_without_elimination_a_coarse_step_adds_up() -> None:
     """With the classical method the Euler angles leave a violation at every step; elimination takes it away."""
     engine = "projection[formulation=euler,integrator=rk4,dt=1e-3]"

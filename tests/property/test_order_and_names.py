@@ -31,6 +31,7 @@ def as_written(name: str) -> xr.Dataset:
     return run(load_scene(name))
 
 
+@pytest.mark.nightly
 @pytest.mark.nightly_of("rocking_block", "flick")
 @pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.drill) for name in SLOW)])
 @given(order=st.randoms(use_true_random=False))

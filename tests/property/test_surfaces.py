@@ -51,6 +51,7 @@ def held_circle(ball: MechanismElement, W: float) -> None:
 ratios, spins = st.floats(0.1, 0.66), st.floats(-60.0, 60.0)
 
 
+@pytest.mark.drill
 @settings(max_examples=30, deadline=None)
 @given(radius=st.floats(0.06, 3.0), slope=st.floats(0.05, 1.3), k=ratios, spin=spins, around=st.floats(-3, 3))
 def test_steady_circles_in_a_bowl(radius: float, slope: float, k: float, spin: float, around: float) -> None:
@@ -64,6 +65,7 @@ def test_steady_circles_in_a_bowl(radius: float, slope: float, k: float, spin: f
     held_circle(element(Bowl("wall", radius), k, u, speed * (frame[:, 1:].T @ forward), spin), W)
 
 
+@pytest.mark.nightly
 @settings(max_examples=30, deadline=None)
 @given(way=st.floats(0.06, 3.0), slope=st.floats(0.05, 1.4), k=ratios, spin=spins, around=st.floats(-3, 3))
 def test_steady_circles_in_a_cone(way: float, slope: float, k: float, spin: float, around: float) -> None:
@@ -72,6 +74,7 @@ def test_steady_circles_in_a_cone(way: float, slope: float, k: float, spin: floa
     held_circle(element(Cone("wall", slope), k, (around, way), (W * way * np.cos(slope), 0.0), spin), W)
 
 
+@pytest.mark.nightly
 @settings(max_examples=30, deadline=None)
 @given(ring=st.floats(0.2, 3.0), wire=st.floats(0.01, 0.1), slope=st.floats(0.05, 1.4), k=ratios, spin=spins)
 def test_steady_circles_on_a_ring(ring: float, wire: float, slope: float, k: float, spin: float) -> None:
@@ -82,6 +85,7 @@ def test_steady_circles_on_a_ring(ring: float, wire: float, slope: float, k: flo
     held_circle(element(Torus("wall", ring, wire), k, (0.3, -slope), (W * rho, 0.0), spin), W)
 
 
+@pytest.mark.nightly
 @settings(max_examples=30, deadline=None)
 @given(W=st.floats(0.1, 20.0), k=ratios, x=st.floats(-2, 2), vx=st.floats(-2, 2), vy=st.floats(-2, 2), spin=spins)
 def test_circles_on_a_turntable(W: float, k: float, x: float, vx: float, vy: float, spin: float) -> None:
@@ -110,7 +114,7 @@ def test_a_ball_on_the_rim_leaves_it_in_both_routes() -> None:
     assert float(found["gap"][-1]) > 0.1
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_truth_ends_at_the_tip_of_a_cone() -> None:
     """A ball that rolls straight into it has values up to there, with a constant acceleration, and the true reason."""
     scene = load_scene("cone", speed=0.0, normal_spin=0.0)
@@ -125,6 +129,7 @@ def test_a_truth_ends_at_the_tip_of_a_cone() -> None:
     assert found["s"].to_numpy() == pytest.approx(start + rising * known - down * known**2 / 2, abs=1e-12)
 
 
+@pytest.mark.drill
 def test_a_small_swing_passes_the_bottom_of_a_bowl() -> None:
     """From rest it swings at ω² = g/((1 + k)(R - a)), through the bottom, with an error bar near round-off."""
     amplitude, R, a, k = 1e-4, 0.225, 0.025, 0.4
@@ -137,7 +142,7 @@ def test_a_small_swing_passes_the_bottom_of_a_bowl() -> None:
     assert np.abs(found["eta"]).max() == 0.0
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_ball_through_the_bottom_is_the_limit_of_balls_that_pass_it(times: np.ndarray) -> None:
     """Nothing happens at the bottom: with a side speed of 1e-6 m/s the motion is the same to as much."""
     scenes = [Scene("s", "", (element(Bowl("wall", 0.225), 0.4, (0.1, 0), (0.0, v), 0.0),)) for v in (0.0, 1e-6)]

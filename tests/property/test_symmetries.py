@@ -72,6 +72,8 @@ def assert_same(found: xr.Dataset, expected: xr.Dataset, shifts: Changes = {}, f
         assert found[name].to_numpy() == pytest.approx(wanted, abs=CLOSE * size * max(1.0, abs(factor))), name
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @given(motion=MOTIONS, gamma=st.floats(-3.0, 3.0))
 def test_rotation_about_the_axis(way: str, motion: dict[str, float], gamma: float) -> None:
     """A ball that starts elsewhere around the cylinder does the same there."""
@@ -79,6 +81,8 @@ def test_rotation_about_the_axis(way: str, motion: dict[str, float], gamma: floa
     assert_same(solve(way, moved(scene, (gamma, 0.0)), UNTIL), solve(way, scene, UNTIL), {"gamma": gamma})
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @given(motion=MOTIONS, height=st.floats(-2.0, 2.0))
 def test_shift_along_the_axis(way: str, motion: dict[str, float], height: float) -> None:
     """A ball that starts higher does the same higher up, with more potential energy."""
@@ -87,6 +91,8 @@ def test_shift_along_the_axis(way: str, motion: dict[str, float], height: float)
     assert_same(lifted, solve(way, scene, UNTIL), {"z": height, "energy": 0.517 * 9.81 * height})
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @given(motion=MOTIONS)
 def test_mirror(way: str, motion: dict[str, float]) -> None:
     """In a mirror through the axis the ball goes round the other way, and what is an axial vector turns over."""
@@ -97,6 +103,8 @@ def test_mirror(way: str, motion: dict[str, float]) -> None:
     assert_same(reflected, solve(way, scene, UNTIL), factors=signs)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @given(motion=MOTIONS, length=st.floats(0.1, 10), mass=st.floats(0.1, 10), time=st.floats(0.3, 3))
 def test_units(way: str, motion: dict[str, float], length: float, mass: float, time: float) -> None:
     """In other units of length, mass and time every answer is the same quantity in those units."""
@@ -113,6 +121,8 @@ def test_units(way: str, motion: dict[str, float], length: float, mass: float, t
     assert_same(found, solve(way, scene, UNTIL), factors=factors)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @given(motion=MOTIONS)
 def test_one_run_in_two(way: str, motion: dict[str, float]) -> None:
     """A run that starts from the state in the middle of another ends where the other ends."""
@@ -129,6 +139,8 @@ def test_one_run_in_two(way: str, motion: dict[str, float]) -> None:
     assert_same(rest.isel(time=[-1]), whole.isel(time=[-1]))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @given(motion=MOTIONS)
 def test_reversal(way: str, motion: dict[str, float]) -> None:
     """Without resistance a ball whose velocities are reversed goes back to where it came from."""
@@ -146,6 +158,8 @@ def test_reversal(way: str, motion: dict[str, float]) -> None:
     assert_same(back.isel(time=[-1]), there.isel(time=[0]), factors=signs)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @given(motion=MOTIONS)
 def test_energy_is_accounted_for(way: str, motion: dict[str, float]) -> None:
     """What the energy loses is what the resistance takes; without resistance it loses nothing."""
@@ -157,6 +171,7 @@ def test_energy_is_accounted_for(way: str, motion: dict[str, float]) -> None:
     assert np.max(np.abs(energy_balance(scene.elements[0].on_wall, of_ball(dataset)))) < bound * kinetic
 
 
+@pytest.mark.drill
 @given(motion=MOTIONS, radius=st.floats(0.005, 0.2), mass=st.floats(1e-3, 1e3), gravity=st.floats(0, 50))
 def test_certificate_of_random_scenes(motion: dict[str, float], radius: float, mass: float, gravity: float) -> None:
     """Whatever the numbers of a scene, the engine builds it, to round-off."""

@@ -103,6 +103,7 @@ def test_natural_sizes_are_those_in_a_turned_world(seed: int) -> None:
     assert natural_scale(mechanism) == natural_scale(turned_mechanism(mechanism, rpy, (0.0, 0.0, 0.0)))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(("name", "resisted"), _cases())
 def test_a_scene_with_contacts_has_the_same_truth_in_a_turned_world(name: str, resisted: bool) -> None:

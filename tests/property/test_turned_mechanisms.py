@@ -51,6 +51,8 @@ _ALL = [
 CASES = [pytest.param(*case, marks=pytest.mark.nightly if place % 3 else ()) for place, case in enumerate(_ALL)]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("name", "engine", "formulation"), CASES)
 def test_a_turned_mechanism_has_the_same_certificate(name: str, engine: str, formulation: str) -> None:
     """An engine builds a turned and shifted scene as well as the scene itself, or refuses both."""

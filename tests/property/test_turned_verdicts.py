@@ -87,6 +87,7 @@ def _cases(quick: Iterable[Any], night: Iterable[Any]) -> list[Any]:
     return [*(pytest.param(case, marks=pytest.mark.drill) for case in quick), *tonight]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("stop", "friction_hold")
 @pytest.mark.parametrize("name", _cases(QUICK, NIGHT))
 def test_a_scene_is_told_alike_elsewhere(name: str) -> None:
@@ -94,6 +95,7 @@ def test_a_scene_is_told_alike_elsewhere(name: str) -> None:
     assert_told_alike(load_scene(name), (QUICK | NIGHT)[name], sum(map(ord, name)))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", _cases([30], range(60)))
 def test_a_random_mechanism_is_told_alike_elsewhere(seed: int) -> None:
     """The same of random trees and loops of all kinds of joints."""
@@ -101,6 +103,7 @@ def test_a_random_mechanism_is_told_alike_elsewhere(seed: int) -> None:
     assert_told_alike(Scene("random", "", (MechanismElement(mechanism),)), 0.2, seed)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", _cases([0], range(110)))
 def test_a_random_contact_is_told_alike_elsewhere(seed: int) -> None:
     """The same of random bodies that touch."""
@@ -108,6 +111,7 @@ def test_a_random_contact_is_told_alike_elsewhere(seed: int) -> None:
     assert_told_alike(Scene("random", "", (MechanismElement(mechanism),)), until, seed)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("ending", "text"),
     [pytest.param("urdf", urdf(), marks=pytest.mark.drill), pytest.param("xml", mjcf(), marks=NIGHTLY)],

@@ -107,7 +107,7 @@ def test_everything_that_is_used_has_a_name(unfolded: Visit) -> None:
     unfolded.page.evaluate("document.querySelector('main').lastChild.remove()")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_phone_scrolls_down_only(report_page: Path, visit: Visiting) -> None:
     """Nothing is wider than 390 pixels; what must be, scrolls in a region of its own; text too wide would be found."""
     with visit(report_page, **PHONE) as seen:
@@ -141,6 +141,7 @@ def test_text_differs_from_its_background(unfolded: Visit, scheme: str) -> None:
     faint.evaluate("(style) => style.remove()")
 
 
+@pytest.mark.drill
 def test_nobody_who_asked_for_stillness_sees_motion(seen: Visit) -> None:
     """With reduced motion preferred, nothing scrolls, fades or turns by itself."""
     style = seen.page.add_style_tag(content="h1 { transition: color 2s } .answer { animation: none 3s infinite }")

@@ -71,7 +71,7 @@ def test_figures_are_drawn_when_they_come_into_view(report_page: Path, drawn_pag
     seen.page.evaluate("document.querySelector('main').lastElementChild.remove()")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -> None:
     """Every link within the page ends at something one can see, however it was folded; a dead one is found."""
     with visit(report_page, before=UNDRAWN) as seen:
@@ -135,6 +135,7 @@ def test_open_all_opens_all_and_closes_again(report_page: Path, visit: Visiting)
         assert seen.messages == []
 
 
+@pytest.mark.drill
 def test_an_address_with_a_fragment_opens_its_evidence(report_page: Path, visit: Visiting) -> None:
     """A link from elsewhere into a folded part unfolds it, and what lies around it."""
     name = "evidence-invented.beta.speed-4"
@@ -217,6 +218,7 @@ def test_zoom_in_one_figure_is_zoom_in_all(drawn: Visit) -> None:
     drawn.wait(whole)
 
 
+@pytest.mark.drill
 def test_pointer_in_one_figure_shows_the_time_in_all(drawn: Visit) -> None:
     """Where the pointer is on a curve, every other figure shows its truth, until the pointer leaves."""
     labels = "drawn.filter((element) => element.querySelector('.hovertext')).length"

@@ -25,6 +25,8 @@ CONTACT = MechanismCapability.CONTACT
 OURS = "integrated by proofroll"
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("engine", "words"),
     [
@@ -60,6 +62,8 @@ def test_a_caveat_is_one_clause() -> None:
     assert told
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("engine", "need", "words"),
     [

@@ -49,7 +49,7 @@ def counted(load: Callable[..., Any], counts: Counter[str]) -> Callable[..., Any
     return loading
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_nothing_is_loaded_again_after_judging(
     install_engines: Callable[[Mapping[str, str]], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

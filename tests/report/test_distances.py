@@ -117,6 +117,7 @@ def test_a_truth_has_no_such_table() -> None:
     assert distances_of("", None, {}) is None
 
 
+@pytest.mark.drill
 def test_page_terminal_and_json_show_the_table(content: ReportContent, parse: Any) -> None:
     """At its point each has the bars of the reference first, then a line for each row with its cost there."""
     runs = content.comparisons[0].runs

@@ -92,7 +92,7 @@ def test_nothing_that_others_write_runs(drawn_page: Drawn, poisoned_page: Path, 
     assert [message for message in poisoned.messages if spoilt not in message] == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_poison_would_be_felt(poisoned_page: Path, poison: Poison, tmp_path: Path, visit: Visiting) -> None:
     """The check above can fail: one string that is let through once, as text or in an attribute, does its harm."""
     text = poisoned_page.read_text(encoding="utf-8")

@@ -49,6 +49,7 @@ def test_rough_curves_keep_extrema_ends_and_gaps() -> None:
     assert np.isnan(ended[kept([ended])]).any(), "what is not there is not drawn"
 
 
+@pytest.mark.drill
 def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Store], tmp_path: Path) -> None:
     """Of thousands of samples with one that sticks out, to all digits that the page shows."""
     outcome, _ = made

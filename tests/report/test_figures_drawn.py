@@ -66,6 +66,7 @@ def test_largest_distance_in_the_figure_is_the_judged_error(seen: Visit, everyth
         assert error(max(y for y in curve["y"] if y is not None), 3) == error(judged.error, 3)
 
 
+@pytest.mark.drill
 def test_keyboard_reads_and_zooms(seen: Visit) -> None:
     """Arrows show the truth at a sample in every figure of the section and say it; plus zooms all; 0 returns."""
     canvas = seen.page.locator(FIGURE)
@@ -142,6 +143,7 @@ def test_curves_are_named_at_their_ends(drawn_page: Drawn) -> None:
         assert not figure["cut"]
 
 
+@pytest.mark.drill
 def test_names_at_ends_follow_the_zoom(seen: Visit) -> None:
     """A zoom to a part of the time moves the names to where the curves end there; back, they are as before."""
     names = f"""document.querySelector('{FIGURE}').layout.annotations.filter(({{ name }}) => name === 'end')

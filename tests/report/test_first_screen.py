@@ -78,7 +78,7 @@ def test_a_number_has_its_measure() -> None:
     assert answers_sentence([]) == "Nothing was run that could be advised."
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_tolerance_that_is_chosen_is_shown_and_in_the_address(report_page: Path, visit: Visiting) -> None:
     """One part of the screen is seen, that of the tolerance; the address and the back button have it."""
     shown = "[...document.querySelectorAll('[data-tolerance]')].filter((part) => part.checkVisibility())"

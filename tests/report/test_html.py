@@ -27,6 +27,7 @@ from proofroll.studies.comparison.outcome import Outcome
 COMMAND = "proofroll report invented"
 
 
+@pytest.mark.drill
 def test_page_needs_no_other_file_and_no_network(html: str, parse: Any) -> None:
     """Nothing in the page names another place, and its policy forbids to load from one."""
     assert "http:" not in html
@@ -139,6 +140,7 @@ def test_nothing_that_others_write_becomes_markup(made: tuple[Outcome, Store], p
     assert "<img src=x" in json.loads(unpack(html, "curves"))["rows"][0][0]["name"]
 
 
+@pytest.mark.drill
 def test_a_comparison_that_varies_nothing(made: tuple[Outcome, Store]) -> None:
     """Of a scene as it is nothing is said to vary."""
     for vary, said in (({"speed": [1.0]}, True), ({}, False)):
@@ -147,6 +149,7 @@ def test_a_comparison_that_varies_nothing(made: tuple[Outcome, Store]) -> None:
         assert ("; varied:" in page(content, [point_curves(made[0])])) is said
 
 
+@pytest.mark.drill
 def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, Store], tmp_path: Path) -> None:
     """An infinite error is null in JSON and a sign on the page."""
     outcome, _ = made

@@ -46,7 +46,7 @@ def test_every_judgement_of_every_run_is_a_line(content: ReportContent) -> None:
             assert {line.status for line in lines} == {run.status}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_rung_of_a_ladder_is_a_line_without_verdict(tmp_path: Path) -> None:
     """The runs with other steps are in the table with their own errors and the cost of their sampled run."""
     row = Row("projection[formulation=euler,preset=default]", "close", list(Verdict), because="a look")

@@ -52,6 +52,7 @@ def report(compared: tuple[Outcome, Store, Path]) -> Path:
     return folder
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 def test_only_single_curves_are_drawn(compared: tuple[Outcome, Store, Path]) -> None:
     """Coordinates of points and joints and determinate reactions have curves; an array of many components has none."""
@@ -82,7 +83,7 @@ def test_the_page_shows_the_mechanism(report: Path) -> None:
     assert all(verdict["verdict"] == "agrees" for verdict in content["comparisons"][0]["rows"])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_mechanism_is_replayed(
     compared: tuple[Outcome, Store, Path], report: Path, visit: Callable[..., AbstractContextManager[Visit]]
@@ -114,6 +115,7 @@ def test_bodies_turn_as_often_as_their_spin_says() -> None:
     assert np.linalg.norm(rate) * 0.1 > np.pi, "the samples alone would not show it"
 
 
+@pytest.mark.drill
 def test_forces_of_contact_are_replayed_at_the_shapes() -> None:
     """A ladder shows the forces of floor and wall at its ends, on the ladder, as the truth has them."""
     scene = load_scene("ladder")
@@ -132,6 +134,7 @@ def test_forces_of_contact_are_replayed_at_the_shapes() -> None:
     ]
 
 
+@pytest.mark.drill
 def test_a_bore_is_replayed_as_a_tube_along_the_way() -> None:
     """A tube around the bore's axis, as long as the way of the balls in it and its diameter."""
     body = Body("b", 1.0, inertia=(4e-4, 4e-4, 4e-4))
@@ -168,6 +171,8 @@ def test_a_ball_on_a_curved_wall_is_drawn_on_a_net(name: str, letters: set[str])
     assert top < ball.centre[1] < top + height
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize(("kind", "half"), [("capsule", [0.1, 0.1, 0.1]), ("cylinder", [0.1, 0.1, 0.3])])
 def test_long_bodies_are_replayed_whole(kind: GeometryKind, half: list[float]) -> None:
     """A capsule has its radius and its length in radii, a cylinder half of its length, along the axis of the file."""
@@ -184,6 +189,7 @@ def test_long_bodies_are_replayed_whole(kind: GeometryKind, half: list[float]) -
     assert Rotation.from_quat(log["turn"]).apply([0, 0, 1]) == pytest.approx([1, 0, 0])
 
 
+@pytest.mark.drill
 def test_bodies_of_vertices_are_replayed_as_rods_around_them() -> None:
     """A block of two corners has rods from its centre of mass to both, and one between them."""
     scene = load_scene("rocking_block")
@@ -195,6 +201,7 @@ def test_bodies_of_vertices_are_replayed_as_rods_around_them() -> None:
     assert [left, right] in rods
 
 
+@pytest.mark.drill
 def test_the_picture_holds_whole_shapes() -> None:
     """Around what moves, the box that the camera shows reaches as far as the sphere, not as its centre of mass."""
     scene = load_scene("eccentric_sphere")

@@ -130,6 +130,7 @@ def test_data_holds_events_onsets_and_their_verdicts(content: ReportContent) -> 
     assert {run.own.onset_verdict for run in runs_at(content, EDGE).values()} == {"ill-posed", "refused"}
 
 
+@pytest.mark.drill
 def test_table_says_what_is_missing_added_and_left_out(content: ReportContent) -> None:
     """Events stand beside the truth's of the same number; more than the table holds are counted."""
     well, edge = truth_at(content, WELL), truth_at(content, EDGE)
@@ -236,6 +237,7 @@ def test_times_are_shown_to_the_digits_of_their_brackets(event: tuple[float, ...
     assert (clock(slip), bracket(slip)) == said
 
 
+@pytest.mark.drill
 def test_written_report_names_no_finite_number_it_has_not(slipping: tuple[Outcome, Store], tmp_path: Path) -> None:
     """The file is JSON that every reader accepts, infinite distances included."""
     begun([slipping[0]], COMMAND).write(tmp_path)

@@ -51,7 +51,7 @@ def printed(on_paper: tuple[PdfReader, list[list[str]], list[int]]) -> PdfReader
     return on_paper[0]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: Visiting) -> None:
     """Every table is as wide as it is and no wider than the paper; a table too wide would be found.
 

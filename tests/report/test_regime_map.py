@@ -38,6 +38,7 @@ def test_counts_and_formulas_go_into_the_data(maps: list[xr.Dataset]) -> None:
     assert counts([plane])[0]["outside_boundaries"] is None
 
 
+@pytest.mark.drill
 def test_picture_is_an_element_that_keeps_to_itself(maps: list[xr.Dataset]) -> None:
     """Own ids, no style for the page, no address; the legend explains the lines."""
     text = inline(maps, "here-")
@@ -51,6 +52,7 @@ def test_picture_is_an_element_that_keeps_to_itself(maps: list[xr.Dataset]) -> N
     assert "μ = (12/7) g c / V0²: above it never slips (f = 0)" in text
 
 
+@pytest.mark.drill
 def test_file_is_a_picture_of_its_own(maps: list[xr.Dataset], tmp_path: Path) -> None:
     """The file opens without the page, also without boundaries."""
     draw([item.drop_vars(["mu_falls", "mu_slips"]) for item in maps[:1]], tmp_path / "map.svg")
@@ -59,7 +61,7 @@ def test_file_is_a_picture_of_its_own(maps: list[xr.Dataset], tmp_path: Path) ->
     assert "V0²" not in text
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_report_shows_the_maps(made: tuple[Outcome, Store], maps: Any, tmp_path: Path, parse: Any) -> None:
     """Twice on the page of further studies, no id is used twice."""
     whole = begun([made[0]], "proofroll report")

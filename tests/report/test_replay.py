@@ -81,6 +81,7 @@ def test_the_true_ball_turns_as_its_spin_says(rolling: Any) -> None:
     assert np.linalg.norm(spin(body, 0.0)) * EVERY > np.pi, "the samples alone would not show which way it turns"
 
 
+@pytest.mark.drill
 def test_an_engine_keeps_its_own_orientation(rolling: Any) -> None:
     """At its samples an engine's orientation is its own, in between its spin carries it; without one it has none."""
     body, data = rolling
@@ -436,7 +437,7 @@ def test_a_case_opens_at_the_largest_error_in_sight(
         assert opened.messages == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
     """Keys, time line, ghosts, view and the choice of a case each change what is shown; values are the truth's."""
     opened = replayed
@@ -497,7 +498,7 @@ def test_without_a_picture_the_values_follow_the_time(
 
 
 @pytest.mark.nightly_of("projection-False")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(("engine", "hidden"), [("truth", True), ("projection", False)])
 def test_a_run_alone_has_no_table_of_ghosts(
     proofroll: Callable[..., tuple[int, str, str]], tmp_path: Path, visit: Visiting, engine: str, hidden: bool

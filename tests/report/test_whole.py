@@ -113,6 +113,7 @@ def test_sections_answer_in_order(written_page: str, written_studies: str, parse
     )
 
 
+@pytest.mark.drill
 def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     """What agrees best, what is silent, what to use; other data give other sentences, none at all still give three."""
     found = report.content.findings
@@ -220,6 +221,8 @@ class Broken:
         return {prefix: ""}
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.drill_of("error0")
 @pytest.mark.parametrize("error", [ProofrollError("there is no truth here"), ZeroDivisionError("by zero")])
 def test_a_part_that_fails_leaves_a_sentence(

@@ -32,6 +32,8 @@ def arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "robot/arm.xml"
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("run", "recommend", "ladder", "report")
 @pytest.mark.drill_of("compare", "check")
 @pytest.mark.parametrize(
@@ -51,7 +53,7 @@ def test_a_command_reads_below_the_root(proofroll: Proofroll, arm: str, words: l
     assert ROOT not in os.environ
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_runs_that_are_kept_are_read_below_the_root(proofroll: Proofroll, arm: str) -> None:
     """A stored run is shown and judged with the root, and the command that is proposed has it."""
     code, out, err = proofroll("run", arm, *SHORT, "--out", "run.nc", "--root", ".")
@@ -70,6 +72,7 @@ def test_a_root_that_is_none(proofroll: Proofroll, arm: str) -> None:
         assert says in err
 
 
+@pytest.mark.drill
 def test_the_option_is_the_same_everywhere() -> None:
     """Each command that takes parameters or a controller of a scene takes a root, in the same words."""
     taken = {

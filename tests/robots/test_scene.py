@@ -58,6 +58,8 @@ def robot(tmp_path: Path):
     return written
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", FILES)
 def test_a_robot_moves_as_its_file_says(robot, name):
     """Accelerations of the scene at its start are those of the file's robot by world Jacobians, damping included."""
@@ -85,6 +87,7 @@ def test_a_robot_moves_as_its_file_says(robot, name):
         assert found[at] == pytest.approx(want, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("arm.urdf")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", FILES)
@@ -110,7 +113,7 @@ def test_engines_follow_the_truth_of_a_robot(robot, name, monkeypatch):
                 )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_joint_that_follows_another_is_coupled_to_it(robot):
     """A mimic of a URDF is a coupling that the truth and engines obey; couplings=0 leaves it out."""
     mimic = robot("mimic.urdf", urdf(third='<mimic joint="j1" multiplier="0.5" offset="0.1"/>'))
@@ -126,6 +129,7 @@ def test_a_joint_that_follows_another_is_coupled_to_it(robot):
     assert "couplings of joints" not in load_scene(mimic, couplings=0).requires
 
 
+@pytest.mark.drill
 def test_what_no_scene_has_is_refused_by_name(robot):
     """A mimic of no ratio, dry friction, a massless moving link, an impossible inertia, a tendon: one line names it."""
     times = np.array([0.0, 0.1])
@@ -173,7 +177,7 @@ def test_what_an_mjcf_disables_or_has_beyond_a_scene(robot):
         load_scene(robot("cubic.xml", text.replace("KIND", "hinge").replace('"9"', '"9 2"')))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_stops_are_there_when_asked_for(robot):
     """With limits=1 an engine must provide stops; without, the same motion goes through them."""
     path = robot("arm.urdf", urdf())
@@ -258,7 +262,7 @@ def test_what_a_file_has_beyond_the_answer_is_said(robot):
     assert load_scene(arm, limits=1).omitted == (drives, "springStiffness of 1 joint", "contacts")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_commands_say_what_is_not_in_the_answer(robot):
     """Run and compare print a line on what the file has and the answer leaves out."""
     arm = robot("arm.urdf", urdf())
@@ -286,6 +290,7 @@ def test_rotors_of_transmissions_are_armatures(tmp_path: Path) -> None:
         load_scene(str(path))
 
 
+@pytest.mark.drill
 def test_controls_of_a_keyframe(tmp_path: Path) -> None:
     """A file's keyframe gives controls; what is not taken of it is said, and a wrong number of them refused."""
     path = tmp_path / "arm.xml"
@@ -301,6 +306,8 @@ def test_controls_of_a_keyframe(tmp_path: Path) -> None:
         load_scene(str(path), actuators=1, keyframe=2)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("key", ['qpos="{}" qvel="{}"', 'qpos="{}"', ""], ids=["whole", "at rest", "home"])
 def test_a_keyframe_is_a_start(tmp_path: Path, key: str) -> None:
     """A robot that starts in a keyframe has poses and velocities of MuJoCo's bodies there, whatever its joints are."""

@@ -43,11 +43,21 @@ def bare_names(function: ast.FunctionDef) -> set[str]:
     return names & BARE
 
 
+def _lines(module: Iterable[ast.AST]) -> set[int]:
+    """Lines of a module with such an argument or local, of whatever function: all others need no closer look."""
+    names = (node for node in module if isinstance(node, ast.Name | ast.arg))
+    return {node.lineno for node in names if (node.id if isinstance(node, ast.Name) else node.arg) in BARE}
+
+
 def parts() -> dict[str, float]:
     """Folder of a package -> part of its functions with a local or argument that is a bare determiner or adverb."""
     functions: dict[str, list[bool]] = {}
     for path in (path for folder in FOLDERS for path in folder.rglob("*.py")):
-        bare = [bool(bare_names(item)) for item in _functions(nodes(path))]
+        lines = _lines(nodes(path))
+        bare = [
+            not lines.isdisjoint(range(item.lineno, (item.end_lineno or item.lineno) + 1)) and bool(bare_names(item))
+            for item in _functions(nodes(path))
+        ]
         functions.setdefault(path.parent.relative_to(ROOT).as_posix(), []).extend(bare)
     return {folder: sum(bare) / len(bare) for folder, bare in functions.items() if bare}
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from proofroll.core.number_format import counted
 from proofroll.robots.control.controlled import ControlledScenes
-from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.opening import BASES
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.scene_tables import (
@@ -25,6 +24,7 @@ from proofroll.robots.files.scene_tables import (
     keyframe_states,
     laws,
     read_robot,
+    scene_actuators,
     tables_of,
 )
 from proofroll.robots.model import Robot

@@ -25,6 +25,7 @@ def damped(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.drill
 def test_accepted_causes(proofroll: Proofroll, damped: Path) -> None:
     """A difference exits 0 if all of its causes are accepted, and 1 if one is not; the causes are told all the same."""
     asked = ("check", str(damped), "--engine", "pinocchio", "--states", "2")
@@ -57,7 +58,7 @@ def test_no_such_cause(proofroll: Proofroll, damped: Path) -> None:
     assert "write a list of causes" in " ".join(said.split())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_an_engine_is_fed_without(proofroll: Proofroll, tmp_path: Path) -> None:
     """An engine without an importer does not make the command exit 1 by what it leaves out."""
     path = tmp_path / "arm.xml"

@@ -22,6 +22,7 @@ Proofroll = Callable[..., tuple[int, str, str]]
 Install = Callable[[Mapping[str, str]], None]
 
 
+@pytest.mark.drill
 def test_json(proofroll: Proofroll, arm: Path) -> None:
     """The JSON has the file, its kind and findings, and for every engine version, layers and causes."""
     names = ("mujoco", "pinocchio", "exudyn")
@@ -130,7 +131,7 @@ BAD_READERS = {
 }
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_bad_readers(proofroll: Proofroll, install_readers: Install, arm: Path) -> None:
     """An importer that crashes, raises or is mistaken is a row beside the others."""
     install_readers({name.lower(): name for name in BAD_READERS})
@@ -144,6 +145,7 @@ def test_bad_readers(proofroll: Proofroll, install_readers: Install, arm: Path) 
     assert good["status"] == "holds"
 
 
+@pytest.mark.drill
 def test_a_reader_that_hangs(proofroll: Proofroll, install_readers: Install, arm: Path) -> None:
     """An importer that never answers is a row after the time limit."""
     install_readers({"bad": "Hanging"})
@@ -207,7 +209,7 @@ def test_nothing_moves(proofroll: Proofroll, tmp_path: Path) -> None:
     assert code == 0
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_who_compiles_a_file_also_reads_it(proofroll: Proofroll, tmp_path: Path, started_workers: list[str]) -> None:
     """The engine that defines the format is started once: for what the file means, and for what the engine holds."""

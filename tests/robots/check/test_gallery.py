@@ -38,6 +38,8 @@ def test_outcomes() -> None:
     assert outcome(ImporterRow(engine="one", status="timeout")) == ["timeout"]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["z1", "allegro_right_hand", "half_cheetah", "pusher"])
 def test_as_expected(name: str) -> None:
     """A robot does in our engines what the gallery expects."""

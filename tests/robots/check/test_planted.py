@@ -291,6 +291,8 @@ CASES = [
 ]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("text", "engine", "expected", "base"), CASES)
 def test_real_engines(
     text: str, engine: str, expected: set[str], base: str, robot_workers: Workers, tmp_path: Path
@@ -323,6 +325,7 @@ def test_real_engines(
         assert cause.after < cause.before
 
 
+@pytest.mark.drill
 def test_round_off_of_what_cancels_is_no_difference(tmp_path: Path) -> None:
     """Moments of a round body without mass that turns cancel in the file's reading; what is left accuses no engine."""
     pytest.importorskip("pinocchio")

@@ -127,6 +127,7 @@ def _renamed(text: str, form: str) -> str:
     return text
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("form", "argument"), [("arm_j{}", "*=arm_*"), ("k{}", "j*=k*"), ("j{}_r", "*=*_r")])
 def test_proposed_map(form: str, argument: str, proofroll: Proofroll, tmp_path: Path) -> None:
     """A map is proposed, and taken, where names differ by a prefix or suffix and kinds and tree fit."""

@@ -118,7 +118,7 @@ def test_a_robot_without_a_base_is_held_at_its_root(written: Any) -> None:
     assert {joint.kind for joint in _mechanism(written(CONTROL)).joints} == {"revolute", "prismatic"}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_servos_of_an_mjcf_follow_the_controller(written: Any) -> None:
     """Joints without gains keep the servo of an MJCF, through its gear, with its limit."""
     actuator = '<position name="m" joint="k2" kp="20" kv="2" gear="3" forcerange="-4 4"/>'
@@ -163,6 +163,7 @@ def test_another_policy_is_another_scene(written: Any, tmp_path: Path) -> None:
     assert commands.values(0.0, start).tolist() == pytest.approx([0.65, 0.35, -0.05])
 
 
+@pytest.mark.drill
 def test_a_package_announces_a_policy(written: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A policy that an installed package announces is called by its name, and acts as that of its module."""
     info = tmp_path / "site" / "striders-1.0.dist-info"
@@ -211,7 +212,7 @@ def test_a_base_that_the_file_holds_has_no_start(written: Any) -> None:
         _mechanism(written("[start]\nbase = [0, 0, 1, 1, 0, 0, 0]\n", mjcf(), "xml"))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_each_command_takes_a_controller(written: Any, tmp_path: Path) -> None:
     """The commands run, replay and compare take --control, and a stored run remembers both files."""
     robot, control = written(CONTROL + POLICY + START)

@@ -47,7 +47,7 @@ def rows(
 
 def told(changed: ServoRows, most: float = 1e-6, limit: float = LIMIT) -> list[str]:
     """Clauses on the servos of these rows."""
-    return [cause.sentence for _, cause in servo_causes(changed, law(limit), most) if cause.id == "servo"]
+    return [cause.sentence for cause in servo_causes(changed, law(limit), most) if cause.id == "servo"]
 
 
 @pytest.mark.parametrize("resting", [False, True])
@@ -87,5 +87,5 @@ def test_a_constant_that_is_added_is_no_size() -> None:
     difference = np.tile([0.5, 0.0], (len(TIMES), 1))
     recorded = right + difference
     causes = observation_causes(("x", "y"), recorded, difference, np.abs(recorded).max(axis=0), 1e-3)
-    best = min((cause for _, cause in causes), key=lambda cause: cause.after)
+    best = min(causes, key=lambda cause: cause.after)
     assert (best.id, best.sentence) == ("observed_offset", "parts are observed with a constant added: x 0.5")

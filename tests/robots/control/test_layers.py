@@ -26,6 +26,8 @@ ROBOT = legged()
 LAW = law_of(ROBOT)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("-rk4", "single-rk4")
 @pytest.mark.parametrize("scheme", ["explicit", "implicit", "rk4"])
 @pytest.mark.parametrize("digits", ["", "single", "3"])
@@ -61,7 +63,7 @@ def test_orders_of_a_robot_of_a_package() -> None:
         assert words in first.causes[0].sentence
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_sizes_are_fitted() -> None:
     """Sizes of gains, limits, scale and armature come back to three digits and more."""
     for attribute, factor in (("kp", 0.37), ("kd", 1.73), ("scale", 0.61), ("limit", 0.7), ("armature", 0.33)):
@@ -99,6 +101,7 @@ def test_implicit_damping_and_an_armature_are_named_together() -> None:
     assert not clamped.reason
 
 
+@pytest.mark.drill
 def test_efforts_that_hold_between_instants() -> None:
     """A record whose efforts hold between instants holds in every layer, and breaks at the effort otherwise."""
     held = LAW.change(hold_effort=True)
@@ -143,6 +146,7 @@ def files(tmp_path: Path) -> tuple[str, str, str]:
     return str(record), str(robot), str(control)
 
 
+@pytest.mark.drill
 def test_the_command(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
     """A right record exits 0, a wrong one 1 with the mistake; what the record lacks is said."""
     record, robot, control = files
@@ -163,6 +167,8 @@ def test_the_command(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
     assert effort["causes"][0]["size"] == pytest.approx(0.5, rel=1e-6)
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -195,6 +201,7 @@ def test_robot_and_control_belong_together(proofroll: Proofroll, files: tuple[st
         assert said in err
 
 
+@pytest.mark.drill
 def test_a_step_that_is_too_long_comes_first(proofroll: Proofroll, files: tuple[str, str, str]) -> None:
     """The step that explicit servos need is the first line where the rows are farther apart, and else no line."""
     record, robot, control = files
@@ -204,6 +211,7 @@ def test_a_step_that_is_too_long_comes_first(proofroll: Proofroll, files: tuple[
         assert out.replace("\n", "").startswith(start)
 
 
+@pytest.mark.drill
 def test_on_the_ground_accelerations_are_left_out() -> None:
     """A record on the ground is judged but for its accelerations, and says why."""
     layers = record_layers(recorded(ROBOT, LAW, LAW, count=30), LAW, ROBOT, grounded=True)
@@ -259,7 +267,7 @@ def test_the_fewest_causes_tell_the_importer() -> None:
     assert [cause.id for cause in layer.causes] == ["right"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_assumed_steps_decide_nothing() -> None:
     """What steps between the rows may explain is not decided where rows are steps only by the usual step."""
     record = recorded(ROBOT, LAW, LAW, scheme="rk4", step=1e-3, count=100)

@@ -70,6 +70,8 @@ def loop(
     return judge_record(path / "run.npz", file, None, layout="playground")
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("float64-EULER")
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("precision", ["float64", "float32", "5", "3"])
@@ -93,6 +95,8 @@ PLANTED: dict[str, tuple[dict[str, float], list[str]]] = {
 }
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("EULER-a heavier link and a constant torque", "IMPLICITFAST-more damping and a spring")
 @pytest.mark.nightly_of(
     "EULER-a heavier link",
@@ -119,7 +123,7 @@ def test_sizes_come_back_to_their_errors(tmp_path: Path) -> None:
         assert "at b" in layer.causes[0].sentence
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_nothing_explains_is_not_called_rounding(tmp_path: Path) -> None:
     """A torque that beats is no number of the robot: the layer differs without a cause, or is not decided."""
     (layer,) = loop(tmp_path, "EULER", "float64", beat=0.05).layers

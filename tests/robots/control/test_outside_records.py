@@ -140,6 +140,8 @@ def require_first(judgement: RecordJudgement, layer: str, cause: str) -> None:
     assert (wrong.name, wrong.causes[0].id) == (layer, cause)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("digits", ["", "single", "3"])
 def test_a_right_record_of_another_program_holds(program: str, digits: str, judged: Judged) -> None:
@@ -151,6 +153,8 @@ def test_a_right_record_of_another_program_holds(program: str, digits: str, judg
         assert all(layer.residual is not None and layer.residual < 1e-9 for layer in layers)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "pinocchio-3-dry friction",
     "pinocchio-single-xyzw",
@@ -174,6 +178,8 @@ def test_a_mistake_of_another_program_is_named(program: str, digits: str, name: 
     require_first(judged(recorded(name, program), digits), layer, cause)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("first for last-pinocchio", "kd of hips-pinocchio")
 @pytest.mark.parametrize(
     ("name", "program"),
@@ -199,6 +205,8 @@ def test_numbers_of_single_joints_are_named(name: str, program: str, judged: Jud
     assert words in "\n".join(judgement.lines())
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of("milliseconds", "inverse")
 @pytest.mark.parametrize(
     "name",
@@ -216,6 +224,8 @@ def test_a_mistake_of_columns_accuses_nothing_else(name: str, judged: Judged) ->
     assert wrong[0].causes[0].sentence.startswith(words)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("kind", ["v_WB", "v", "w_WB"])
 def test_a_row_of_lag_shows_in_three_decimals(kind: str, judged: Judged) -> None:
     """Rates that are a row late are named in a file with three decimals, and accuse no observation or frame."""
@@ -226,13 +236,14 @@ def test_a_row_of_lag_shows_in_three_decimals(kind: str, judged: Judged) -> None
     assert causes == [("state", "late")], "\n".join(judgement.lines())
 
 
+@pytest.mark.drill
 def test_a_lag_that_no_digit_shows_is_left_open(judged: Judged) -> None:
     """Where the digits of a file are too few for a lag of a row, the answer says so."""
     judgement = judged(columns_of(Loop(steps=60).record(PROGRAMS["mujoco"])), "2")
     assert "the digits of the record do not tell whether" in judgement.remarks[0]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_rates_whose_rows_are_told_are_not_left_open(judged: Judged) -> None:
     """Rates that are called a row early are not called untold beside that."""
     judgement = judged(columns_of(miswritten(Loop().record(PROGRAMS["pinocchio"]), "early velocities")), "2")
@@ -255,7 +266,8 @@ def test_a_layer_that_stays_open_tells_no_column(judged: Judged, monkeypatch: py
     assert not any("none of 0 " in line for line in judgement.lines())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly_of("late-are one instant")
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("columns_of_actions", "words"),
     [("scaled", "have the scale of the controller already"), ("late", "are one instant")],
@@ -271,6 +283,7 @@ def test_columns_of_actions_do_not_accuse_the_last_one(columns_of_actions: str, 
     assert words in causes[0]
 
 
+@pytest.mark.drill
 def test_late_targets_at_times_of_four_digits(legs: list[str], judged: Judged, monkeypatch: pytest.MonkeyPatch) -> None:
     """Instants that are written to a part of a step belong to the targets of an instant before."""
     monkeypatch.setattr("outside_records.RATE", 75)
@@ -281,12 +294,15 @@ def test_late_targets_at_times_of_four_digits(legs: list[str], judged: Judged, m
     assert judgement.agrees, "\n".join(judgement.lines())
 
 
+@pytest.mark.drill
 def test_digits_that_show_no_force_decide_nothing(judged: Judged) -> None:
     """Accelerations whose rounding is larger than all forces are not judged."""
     layer = judged(recorded("no gravity"), "1").layers[-1]
     assert (layer.residual, layer.reason) == (None, "the rounding of the record is larger than the forces")
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("begin", [3.0, pytest.param(3.007, marks=pytest.mark.drill)])
 def test_a_clock_that_begins_at_any_time(begin: float, program: str, judged: Judged) -> None:
@@ -296,6 +312,7 @@ def test_a_clock_that_begins_at_any_time(begin: float, program: str, judged: Jud
     assert judgement.agrees, "\n".join(judgement.lines())
 
 
+@pytest.mark.drill
 def test_a_limit_that_is_never_reached_has_a_bound(judged: Judged) -> None:
     """Where no effort is at a limit, it is at least the largest effort, beside the cause that there is none."""
     said = "\n".join(judged(columns_of(Loop(limit=40.0).record(PROGRAMS["mujoco"]))).lines())
@@ -307,7 +324,7 @@ def test_a_limit_that_is_never_reached_has_a_bound(judged: Judged) -> None:
 
 
 @pytest.mark.nightly_of("rates at 0.05")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", OF_OBSERVATIONS)
 def test_a_mistake_of_an_observation_shows_in_actions(name: str, judged: Judged) -> None:
     """Where no observation is recorded, its mistakes are named at the action."""
@@ -315,7 +332,7 @@ def test_a_mistake_of_an_observation_shows_in_actions(name: str, judged: Judged)
     require_first(judged(columns), "action", MISTAKES[name][0])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.nightly_of("dry friction", "payload")
 @pytest.mark.parametrize("name", CLOSED)
 def test_what_no_file_has_is_named_with_what_it_explains(name: str, judged: Judged) -> None:
@@ -335,6 +352,7 @@ def test_a_payload_shows_in_states_alone(judged: Judged) -> None:
     assert "trunk carries 0.15 kg more, at (0.1, 0.05, 0.12) m" in "\n".join(judgement.lines())
 
 
+@pytest.mark.drill
 def test_two_mistakes_at_two_layers_are_both_named(judged: Judged) -> None:
     """Each layer is computed from recorded ones, so mistakes at several layers are named one by one."""
     judgement = judged(recorded("", kd=0.1, pose=np.zeros(6), xyzw=True))
@@ -344,6 +362,7 @@ def test_two_mistakes_at_two_layers_are_both_named(judged: Judged) -> None:
     assert causes["effort"] == "kd"
 
 
+@pytest.mark.drill
 def test_a_quaternion_of_few_digits_is_no_mistake(judged: Judged) -> None:
     """What a program loses of a quaternion, its length shows; other columns have all digits."""
     columns = recorded("")
@@ -354,7 +373,8 @@ def test_a_quaternion_of_few_digits_is_no_mistake(judged: Judged) -> None:
     assert judgement.agrees, "\n".join(judgement.lines())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly_of("-every layer that was looked at holds")
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "said"),
     [("", "every layer that was looked at holds"), ("spin in the world", "angular velocity of the base is observed")],
@@ -384,6 +404,8 @@ def test_a_search_that_ran_out_of_time_decides_nothing(
     assert (code, "give --robot, too" in " ".join(err.split())) == (2, True)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("begin", "name", "said"),
     [
@@ -404,6 +426,7 @@ def test_a_record_that_begins_later(
     assert said in " ".join(out.split())
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("kinds", "name", "code", "said"),
@@ -425,7 +448,7 @@ def test_states_of_a_record_that_begins_later(
     assert said in " ".join(out.split())
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_record_with_names_and_units_of_its_own(proofroll: Proofroll, legs: list[str], tmp_path: Path) -> None:
     """Columns of another program are named by ``--map``; milliseconds, degrees and axes of the base are converted.
 
@@ -465,6 +488,8 @@ def _in_base(quaternion: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).inv().apply(vectors))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("layout", ["playground", "isaaclab", "legged_gym"])
 def test_arrays_of_a_training_framework(layout: str, legs: list[str], tmp_path: Path) -> None:
     """Arrays are read with the quaternion, frames, point and order of joints of their program, in single precision."""

@@ -45,6 +45,7 @@ def judged(tmp_path: Path) -> Judged:
     return judgement
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of("pair3-pinocchio")
 @pytest.mark.drill
 @pytest.mark.parametrize(
@@ -74,7 +75,7 @@ def test_what_no_cause_explains_is_told(judged: Judged, monkeypatch: pytest.Monk
     assert layer.causes[0].after > 1e-6
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_leaves_more_is_no_alternative(judged: Judged) -> None:
     """Beside causes that leave rounding alone none is listed that leaves a part of the difference."""
     layer = next(item for item in judged(Loop(ramp="recorded"), "pinocchio").layers if item.name == "target")

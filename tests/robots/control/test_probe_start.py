@@ -58,7 +58,7 @@ def record(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> Callable[..
     return made
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("program", "name", "base"),
     [
@@ -109,7 +109,7 @@ def test_a_probe_that_is_there_says_what_to_do(proofroll: Proofroll) -> None:
     assert "'probe_arm_mujoco.py': this file is there already; remove or move it, or run the command in" in err
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_controller_and_a_ref_do_not_meet(proofroll: Proofroll, record: Callable[..., list[str]]) -> None:
     """Arrays count from `ref` and a controller from the file's pose: both together are refused in one line."""
     Path("stand.toml").write_text('rate = 50\n[[gains]]\njoints = "*"\nkp = 5\n')
@@ -118,6 +118,7 @@ def test_a_controller_and_a_ref_do_not_meet(proofroll: Proofroll, record: Callab
     assert "hip has ref = 0.17453 in the robot's file: qpos counts from there" in err
 
 
+@pytest.mark.drill
 def test_a_probe_of_an_mjcf(proofroll: Proofroll, record: Callable[..., list[str]]) -> None:
     """An MJCF moves by known efforts alone: its servo and its integrator count for nothing, and its stops are far."""
     code, out, err = proofroll(*record("leg.xml", "mujoco"))

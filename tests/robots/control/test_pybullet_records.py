@@ -50,8 +50,9 @@ def arrays(name: str, folder: Path) -> Path:
     return folder / f"{name}.npz"
 
 
+@pytest.mark.drill
 @pytest.mark.drill_of("air", "stop")
-@pytest.mark.nightly_of("defaults", "servos", "honest")
+@pytest.mark.nightly_of("defaults", "servos", "honest", "stop", "air")
 @pytest.mark.parametrize("name", NAMED)
 def test_columns_are_explained(name: str) -> None:
     """Columns under our names: each setting that PyBullet's user left is named, and nothing besides."""
@@ -118,7 +119,7 @@ def test_steps_that_are_assumed_are_told(known: bool, tmp_path: Path, monkeypatc
     assert ("the usual step of pybullet" in layer.reason) != known
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_drag_has_its_size() -> None:
     """The damping of links is told with its size, 0.04, and closes what differs."""
     (cause,) = judged("air").layers[-1].causes
@@ -126,7 +127,7 @@ def test_drag_has_its_size() -> None:
     assert cause.after < 1e-10
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_rows_at_a_stop_are_left_out() -> None:
     """A joint that reaches its limit is told with the time, and its rows do not count."""
     layer = judged("stop").layers[-1]

@@ -41,6 +41,7 @@ def _scene(name: str, folder: Path) -> Scene:
     return load_scene(with_control(str(path), control), **SET.get(name, {}))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize("name", list(ROBOTS))
 def test_engines_agree_on_a_robot_under_a_policy(name: str, tmp_path: Path) -> None:

@@ -50,6 +50,7 @@ def moved(q: float, v: float) -> tuple[np.ndarray, np.ndarray]:
     return places, rates
 
 
+@pytest.mark.drill
 def test_motors_that_hold_are_named_with_the_forces_that_are_off(judged: Judged) -> None:
     """A joint that changing efforts and its weight do not move has motors; the distance is that of the forces."""
     layer = judged(PLACE, 0.0, CHANGING)
@@ -59,6 +60,8 @@ def test_motors_that_hold_are_named_with_the_forces_that_are_off(judged: Judged)
     assert 0 < layer.bar < 1e-6
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("effort", "words"),
     [(-WEIGHT, "the effort scale has the other sign"), (0.0, "the gravity is 0 ± ")],
@@ -70,6 +73,8 @@ def test_numbers_that_explain_a_joint_at_rest_go_before_motors(effort: float, wo
     assert "held_joints" not in [cause.id for cause in layer.causes]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("friction", "causes"), [(50, []), (1, ["held_joints"])])
 def test_dry_friction_of_the_file_holds_a_joint_as_far_as_it_goes(
     friction: float, causes: list[str], judged: Judged
@@ -89,6 +94,7 @@ def test_a_program_without_stops_holds_beyond_limits(start: float, judged: Judge
     assert (layer.residual is None, layer.reason) == (False, "")
 
 
+@pytest.mark.drill
 def test_a_joint_that_lies_at_its_stop_all_the_time_has_no_row(judged: Judged) -> None:
     """Where a stop holds a joint in all rows, that is the reason, and not motors or a controller."""
     layer = judged(3.0, 0.0, 9 + CHANGING)

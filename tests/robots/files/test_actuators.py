@@ -56,6 +56,7 @@ CASES = [
 ]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("actuators", "flag", "keyframe"), CASES)
 def test_efforts_are_those_of_the_file(tmp_path, actuators, flag, keyframe):
     """Each joint has the effort that MuJoCo gives it in the pose of release, at zero and at a keyframe's controls."""

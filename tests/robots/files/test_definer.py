@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import pytest
 
-from proofroll.robots.files.definer import Definer
+from proofroll.robots.files.mjcf.compiler import Definer
 from proofroll.running.idle_workers import Workers
 
 

@@ -57,6 +57,8 @@ def held_apart(path: Path, mechanism: Any, q: np.ndarray) -> float:
     return float(np.abs(data.efc_pos[: data.ne]).max())
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "text",
     [
@@ -122,6 +124,7 @@ RANGES = DIFFERENTIAL.replace('<fixed name="in">', '<fixed name="in" limited="tr
 )[0]
 
 
+@pytest.mark.drill
 def test_a_limited_tendon_between_two_sites_is_a_cable(tmp_path: Path) -> None:
     """A box that hangs on three limited tendons starts as in its file and stays, in MuJoCo too; none falls freely."""
     scene = load_scene(str(written(tmp_path, BOX)))

@@ -98,6 +98,7 @@ def test_excluded_pairs_do_not_touch(stood: Callable[..., Scene]) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("mesh", "radius"), [(False, 0.02), (True, 0.0)], ids=["balls", "meshes"])
 def test_half_a_margin_is_a_larger_radius_and_half_a_higher_floor(
     stood: Callable[..., Scene], mesh: bool, radius: float
@@ -111,6 +112,7 @@ def test_half_a_margin_is_a_larger_radius_and_half_a_higher_floor(
     assert {shape.position[2] for shape in shapes if shape.kind == "plane"} == {0.0025}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("shape", ['type="sphere" size=".02"', BLOCK, 'type="capsule" size=".02 .02"'])
 def test_turning_friction_of_feet_is_taken(stood: Callable[..., Scene], shape: str) -> None:
     """Condim 4 adds friction against spin and 6 against rolling, with the file's lengths, in the cone of sliding."""
@@ -123,6 +125,7 @@ def test_turning_friction_of_feet_is_taken(stood: Callable[..., Scene], shape: s
     assert _pairs(stood(robot(foot), CONTROL + "friction = 0\n"))["rear_foot on floor"].cone == "separate"
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("foot", "says"),
     [
@@ -155,6 +158,7 @@ def test_a_plane_stands_under_a_file_without_a_floor(stood: Callable[..., Scene]
         stood(bare, ground=1)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("after", ["", '<contact><pair geom1="left_foot" geom2="floor"/></contact>'])
 def test_a_plane_takes_the_place_of_the_floor_of_a_file(stood: Callable[..., Scene], after: str) -> None:
     """Ground = 2 lets each foot touch the plane z = 0 alone, wherever the file's floor is and whatever its name."""
@@ -196,6 +200,7 @@ def test_a_mesh_stands_on_the_corners_of_its_hull(stood: Callable[..., Scene]) -
     assert {shape.radius for shape in mechanism.geometries if shape.kind == "sphere"} == {0.0}
 
 
+@pytest.mark.nightly
 def test_a_mesh_in_a_file_stands_as_one_in_the_text(stood: Callable[..., Scene], tmp_path: Path) -> None:
     """Its file is read from the folder that the compiler names, where it collides."""
     (tmp_path / "parts").mkdir()
@@ -218,6 +223,7 @@ def test_a_mesh_of_very_many_corners_is_refused_by_its_number(stood: Callable[..
         assert text in str(caught.value)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("gap", "touches"), [(0.01, False), (-0.01, True)])
 def test_a_mesh_on_another_shape_has_no_contact(stood: Callable[..., Scene], gap: float, touches: bool) -> None:
     """Where it touches one that is no plane, both are named with the pair; where it comes near, they are left out."""
@@ -279,6 +285,7 @@ def table(kind: str, place: str = ".1 .2", turn: str = "0.9659258 0.258819 0.1 0
 BARE = "rate = 50\n[ground]\n"
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("kind", [kind for kind in SHAPES if kind != "box"])
 def test_solids_on_a_box_are_as_far_from_its_face_as_from_the_box(stood: Callable[..., Scene], kind: str) -> None:
     """In any attitude above the face the least gap is the distance of both convex bodies, with the face's normal."""
@@ -340,6 +347,7 @@ def test_shapes_that_come_near_without_a_rule_are_told(stood: Callable[..., Scen
         stood(held.replace(' .09"', ' .065"'), BARE)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("kind", ["cylinder", "box"])
 def test_an_overlap_is_lifted_out_or_told(stood: Callable[..., Scene], kind: str) -> None:
     """A body that floats starts 1 cm above its table; of one that does not the overlap is named, with what helps."""
@@ -367,6 +375,7 @@ FLOORED = robot(HOOF, after=hoof())
 TURNING = 'condim="4" friction=".3 .004"'
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("text", "control", "bound"),
     [

@@ -77,6 +77,8 @@ HOSTILE = {
 }
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("many links", "many elements")
 @pytest.mark.parametrize("name", HOSTILE)
 def test_one_line(name: str, tmp_path: Path) -> None:

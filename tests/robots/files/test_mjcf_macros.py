@@ -122,6 +122,7 @@ def test_nothing_is_dropped_without_a_word(tail: str, tmp_path: Path) -> None:
         open_robot(path)
 
 
+@pytest.mark.drill
 def test_no_log_is_left(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What an engine writes to a log while it reads does not come to lie in the user's folder."""
     pytest.importorskip("mujoco")

@@ -37,6 +37,8 @@ def _meant(path: Path, root: Path | None = None) -> Robot:
     return meaning(file, write(file, place), TIME_LIMIT)[0]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("place", "name", "compiler"),
     [

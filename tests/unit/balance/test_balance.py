@@ -114,7 +114,7 @@ def test_what_has_no_single_equilibrium_is_refused(tmp_path: Path) -> None:
         at_rest(JointCoordinates(falls))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_every_engine_finds_the_balance_of_an_arm_under_servos() -> None:
     """Efforts and eigenvalues of an arm on two servos are the truth's in each engine that has servos."""
     answer = CliRunner().invoke(app, ["balance", "arm_pd"])

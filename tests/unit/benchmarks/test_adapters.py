@@ -14,6 +14,7 @@ from proofroll_benchmarks.adapters import GOAL, AdapterRow, bench_adapters, cont
 from proofroll_benchmarks.bare import Bare
 
 
+@pytest.mark.drill
 def test_a_third_party_engine_without_a_bare_loop(
     install_engines: Callable[[Mapping[str, str]], None],
 ) -> None:
@@ -36,6 +37,7 @@ def test_an_engine_that_cannot_be_loaded(install_engines: Callable[[Mapping[str,
     assert "no_such_module" in row.message
 
 
+@pytest.mark.drill
 def test_a_preset_that_no_formulation_has(install_engines: Callable[[Mapping[str, str]], None]) -> None:
     """It is said, and nothing else is measured in its place."""
     install_engines({"tiny": "tiny:Tiny"})
@@ -54,7 +56,7 @@ def measured(monkeypatch: pytest.MonkeyPatch, centre: Callable[[np.ndarray[Any, 
     return measure_adapter("projection", {"formulation": "rotating_frame"}, {}, 2, 0.002)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_no_ratio_for_another_motion(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bare loop that ends elsewhere is measured against nothing; nor is one whose end is not finite."""
     for wrong in (0.0, np.nan):

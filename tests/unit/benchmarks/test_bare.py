@@ -45,6 +45,7 @@ def centres(
     return adapter.sample().p_WB, bare.run(times), bare.tolerance
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize(("engine", "formulation"), FORMULATIONS)
 def test_the_bare_loop_ends_where_the_adapter_does(engine: str, formulation: str, variant: str) -> None:
@@ -71,6 +72,7 @@ def test_another_start_is_refused(engine: str, formulation: str) -> None:
         load_bare_loop(engine)(scene_with(scene, start=start), settings)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("scene", MECHANISMS)
 @pytest.mark.parametrize(
     ("engine", "formulation", "preset"),
@@ -97,6 +99,8 @@ def test_bare_mechanisms_end_where_the_adapters_do(engine: str, formulation: str
     assert np.linalg.norm(bare.run(np.array([0.0, 0.02, 0.04])) - after.p_WB) <= bare.tolerance
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("scene", CONTACTS)
 def test_bare_loops_of_bodies_that_touch(scene: str) -> None:
     """Every formulation that represents a scene with contacts has a bare loop, which ends where the adapter does."""

@@ -63,6 +63,7 @@ def test_adapters_json(proofroll: Proofroll, tmp_path: Path) -> None:
         assert row["because"]
 
 
+@pytest.mark.drill
 def test_an_engine_without_a_bare_loop(proofroll: Proofroll) -> None:
     """Alone, such an engine has a table that says so, within 100 columns, and the exit code of an engine missing."""
     code, out, _ = proofroll("adapters", "--engine", "tiny", *QUICK)

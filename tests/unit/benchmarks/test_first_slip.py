@@ -73,6 +73,7 @@ def test_random_balls_against_the_truth() -> None:
     assert np.nanmax(np.abs(found - expected)) < 1e-10
 
 
+@pytest.mark.nightly
 def test_random_balls_against_the_other_route(monkeypatch: pytest.MonkeyPatch) -> None:
     """A route that shares no equations with the compiled ones, nor heyoka, finds the same times."""
     balls = random_balls(4)
@@ -84,6 +85,8 @@ def test_random_balls_against_the_other_route(monkeypatch: pytest.MonkeyPatch) -
         assert time == pytest.approx(np.nan if expected is None else expected, abs=1e-10, nan_ok=True)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("distance", [1e-6, 1e-9])  # the truth has its crests to some 1e-10
 @pytest.mark.parametrize("f", [0.0, 3e-4, 5e-4])
 def test_on_either_side_of_every_stair(f: float, distance: float) -> None:

@@ -33,6 +33,7 @@ def nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "run_one", run)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", scene_names())
 def test_every_scene_is_sound(proofroll: Proofroll, name: str) -> None:
     """Each scene of the package passes with a line that counts its parameters, and a few that say how it starts."""
@@ -119,7 +120,7 @@ def test_axes_of_the_start_are_told(proofroll: Proofroll) -> None:
     assert "velocities and forces of a run along the world's" in said
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_scene_is_drawn(proofroll: Proofroll, tmp_path: Path) -> None:
     """With --plot the scene at its start, its parameters and how it starts are a page; a study or robot has none."""
     page = tmp_path / "scene.html"
@@ -165,6 +166,8 @@ friction = 0.3
     assert lines[0] - lines[1] >= 12
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("accuracy")
 @pytest.mark.parametrize("path", sorted(COMPARISONS.glob("*.toml")), ids=lambda path: path.stem)
 def test_every_study_is_sound(proofroll: Proofroll, path: Path) -> None:
@@ -194,6 +197,8 @@ def broken(tmp_path: Path, name: str, old: str, new: str) -> str:
     return str(tmp_path / name)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "old", "new", "words"),
     [

@@ -31,7 +31,7 @@ def test_each_engine_is_started_once(
     assert sorted(started_workers) == ["reduced", "truth"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_engines_that_are_not_asked_for_are_not_started(
     tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], started_workers: list[str]
@@ -88,7 +88,7 @@ TENDON = """<mujoco><worldbody>
 
 
 @pytest.mark.nightly_of("asked1")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("asked", [(), ("--engine", "mujoco")])
 def test_what_no_engine_takes_has_a_row_of_each_with_its_reason(
     asked: tuple[str, ...],
@@ -148,7 +148,7 @@ def test_a_first_look_stays_within_its_budget(
     assert {row["verdict"] for row in content["rows"]} == {"agrees"}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_rows_that_exist_are_shown_where_a_comparison_is_interrupted(
     tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,6 +17,7 @@ from proofroll.files.scene_file import scene_text
 Proofroll = Callable[..., tuple[int, str, str]]
 
 
+@pytest.mark.drill
 def test_a_mechanism_with_other_numbers(proofroll: Proofroll, tmp_path: Path) -> None:
     """The file has the parameters that were set, and the scene's start as its keyframe, from which MuJoCo goes on."""
     file = tmp_path / "long.xml"
@@ -109,7 +110,7 @@ diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody>
 <actuator><position joint="h" kp="2" kv="0.1"/></actuator></mujoco>"""
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_robot_on_its_floor(proofroll: Proofroll, tmp_path: Path) -> None:
     """Check and export take a controller and a ground as run does; what cannot be written has one true reason."""
     robot, stand, held, model = (tmp_path / name for name in ("stool.xml", "stand.toml", "held.toml", "long.xml"))

@@ -110,6 +110,7 @@ def _shipped_studies() -> dict[str, Path]:
     return {path.relative_to(folder).with_suffix("").as_posix(): path for path, folder in files.items()}
 
 
+@pytest.mark.drill
 def test_every_shipped_name_is_found_at_every_door(doors: dict[str, Callable[[str], object]]) -> None:
     """A scene's name at all doors, a study's name, with its folder, too, at those for studies; as a path neither."""
     scenes = {name: data_folder("models") / name / "scene.toml" for name in scene_names()}

@@ -91,7 +91,7 @@ def test_the_creep_of_a_screw_shows(proofroll: Proofroll, tmp_path: Path) -> Non
     assert verdicts["mujoco[formulation=joints,preset=default]"] == "differs"
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_line_to_change_is_named(proofroll: Proofroll, model: Callable[[str], Path], tmp_path: Path) -> None:
     """A step that is too coarse gets the line of one that would do, with which the same question is answered by yes."""
     asked = ["--until", "0.5", "--tolerance", "1e-3", "--out", str(tmp_path)]
@@ -111,7 +111,7 @@ def test_the_line_to_change_is_named(proofroll: Proofroll, model: Callable[[str]
     assert (code, out.partition(": ")[2][:4]) == (0, "Yes:")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_line_of_a_program_is_named(proofroll: Proofroll, tmp_path: Path) -> None:
     """An Exudyn program with too few steps gets the line that makes enough, with which the answer is yes."""
     program, asked = tmp_path / "program.py", ["--until", "0.2", "--tolerance", "1e-3", "--out", str(tmp_path)]

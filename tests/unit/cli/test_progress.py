@@ -50,6 +50,8 @@ with spinner("pendulum"):
 """
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("no_color", [False, True])
 def test_no_color_moves_nothing(no_color: bool) -> None:
     """On a terminal NO_COLOR leaves no escape codes, of colours or of the cursor; without it there is a bar."""
@@ -73,6 +75,8 @@ print(moves)
 """
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("more", "moves"), [([], True), (["json"], False)])
 def test_rows_grow_on_a_terminal_alone(more: list[str], moves: bool) -> None:
     """Rows above a line of progress are shown on a terminal and removed at the end; for a program, never."""

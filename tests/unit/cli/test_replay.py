@@ -19,7 +19,7 @@ RUN = ["--until", "0.1", "--every", "0.05"]
 
 
 @pytest.mark.nightly_of("pendulum-truth-names1-.png-\\x89PNG")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("scene", "engine", "names", "ending", "begins"),
     [
@@ -48,6 +48,7 @@ def curves_of(page: Path) -> list[str]:
     return [re.sub("<[^>]*>", "", title) for title in re.findall("<figcaption>(.*?)</figcaption>", html)]
 
 
+@pytest.mark.drill
 def test_a_page_has_the_curves_that_are_furthest_off(proofroll: Proofroll, tmp_path: Path) -> None:
     """A page has the motion and four curves beside the truth's, one of each unit first, in less than 1.5 MB."""
     run, page = tmp_path / "run.nc", tmp_path / "run.html"
@@ -65,7 +66,7 @@ def test_a_page_has_the_curves_that_are_furthest_off(proofroll: Proofroll, tmp_p
     assert page.stat().st_size < 1.5e6
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_json_says_what_was_written(proofroll: Proofroll, tmp_path: Path) -> None:
     """With --json the paths of the files stand in the document."""
     run, picture = tmp_path / "run.nc", tmp_path / "run.html"
@@ -76,6 +77,7 @@ def test_json_says_what_was_written(proofroll: Proofroll, tmp_path: Path) -> Non
     assert picture.is_file()
 
 
+@pytest.mark.nightly
 def test_bad_files(proofroll: Proofroll, tmp_path: Path) -> None:
     """No file, no run in it, or an ending that no picture has: one line, exit code 2, and nothing is written."""
     for name in ("text.nc", "text.npz"):
@@ -105,6 +107,8 @@ def test_no_other_file_is_written_over(proofroll: Proofroll, tmp_path: Path) -> 
     assert "end the name of the file in .nc, .csv or .npz" in err
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("words", "shown"),
     [(["sphere_in_cylinder", "--set", "speed=3", "--engine", "oracle"], ["truth", "oracle"]),
@@ -125,7 +129,7 @@ def test_a_run_in_motion(proofroll: Proofroll, tmp_path: Path, words: list[str],
     assert case["label"] == ("speed=3" if "--set" in words else case["scene"])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_elements_in_motion(proofroll: Proofroll, tmp_path: Path) -> None:
     """Of a scene of several elements each is a case of its own, with its truth and its part of the run."""
     (tmp_path / "mixed").mkdir()
@@ -146,6 +150,7 @@ def test_elements_in_motion(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "no poses of bodies (p_WB) of mechanism" in err
 
 
+@pytest.mark.drill
 def test_what_cannot_be_replayed(proofroll: Proofroll, tmp_path: Path) -> None:
     """A file that is no page, a run of no scene, and a scene that has changed since: one line, exit code 2."""
     run = tmp_path / "run.nc"

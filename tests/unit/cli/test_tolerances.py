@@ -58,6 +58,7 @@ def test_a_length_bounds_no_angle(proofroll: Proofroll, tmp_path: Path) -> None:
     assert (code, "q.pivot [rad]" in " ".join(told.split())) == (2, True)
 
 
+@pytest.mark.drill
 def test_a_comparison_of_a_scene_is_judged_by_it() -> None:
     """The bands of a default comparison bound what the tolerance bounds, and say why; a file keeps its own."""
     workers = Workers()
@@ -70,6 +71,7 @@ def test_a_comparison_of_a_scene_is_judged_by_it() -> None:
         comparison_named("stick_slip", {}, workers, None, tolerance=["1 mm"])
 
 
+@pytest.mark.drill
 def test_a_line_that_judge_proposes_asks_the_same_question(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

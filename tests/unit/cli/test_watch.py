@@ -17,7 +17,7 @@ from proofroll.files.kept_runs import kept_lines, kept_path, run_file
 Proofroll = Callable[..., tuple[int, str, str]]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_watched_scene_is_shown_beside_the_truth(proofroll: Proofroll, tmp_path: Path) -> None:
     """The page has the truth and all engines that run, and the script beside it sets the version that it has."""
     folder, page = tmp_path / "mine", tmp_path / "mine.html"

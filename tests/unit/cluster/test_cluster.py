@@ -182,7 +182,7 @@ def test_a_worker_with_other_engines(dask: DaskCluster, shared: Cluster, tmp_pat
         Runner(Store(tmp_path / "store"), cluster=shared).run([asked])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_results_are_those_of_home(dask: DaskCluster, shared: Cluster, tmp_path: Path, room: Path) -> None:
     """One worker, two, and one that is lost in the middle give what home gives, stored once, but for speeds."""
     shutil.copytree(data_folder("models") / "sphere_in_cylinder", tmp_path / "mine" / "my_plane")

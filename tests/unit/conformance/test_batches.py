@@ -19,6 +19,8 @@ def check_of(engine: type, name: str) -> Check:
     return found
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("name", [_RUNS, _ALONE])
 def test_copies_that_move_alone_pass(name: str) -> None:
     """An engine whose copies are runs of their own passes."""

@@ -10,7 +10,7 @@ from proofroll.conformance.checks import _run_apart
 from proofroll.papers.blajer_2006.reduced import Reduced
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_check_apart_ends_as_it_does_here() -> None:
     """In a process of its own a check passes, fails with its text, or says why there is nothing to look at."""
     _run_apart(Reduced, "samples_are_well_formed[closed_form-matched]")

@@ -64,6 +64,8 @@ PLANTED: dict[str, tuple[tuple[str, str], Callable[[Mechanism], Mapping[str, obj
 }
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("law", [*contrasts()])
 @pytest.mark.parametrize("dropped", [True, False])
 def test_a_law_of_another_strength_is_found(law: str, dropped: bool, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -73,6 +73,7 @@ def _within_bars(found: list[Bounce] | None, heights: list[float], energies: lis
         assert abs(item.energy_before - item.energy_after - energy) <= 2 * item.energy_bar
 
 
+@pytest.mark.drill
 def test_the_truth_of_a_ball_tells_its_bounces() -> None:
     """A ball dropped from 1 m with e = 0.8 rises to 0.64 and 0.4096 m, and loses 1 - e² of its energy each time."""
     found = bounces_of(truth(load_scene("bouncing_ball"), np.linspace(0.0, 1.7, 18)))
@@ -80,7 +81,7 @@ def test_the_truth_of_a_ball_tells_its_bounces() -> None:
     _within_bars(found, [0.64, 0.4096], [lost, 0.64 * lost])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_last_rebound_before_a_rest_has_its_height() -> None:
     """Each height is e² of the one before, up to the last impact, whose next rebounds are summed."""
     bounces = bounces_of(truth(load_scene("bouncing_ball"), np.linspace(0.0, 4.1, 3)))
@@ -101,6 +102,7 @@ def _box() -> Scene:
     return Scene("box", "", (MechanismElement(Mechanism(bodies, (free,), geometries=shapes, pairs=pairs)),))
 
 
+@pytest.mark.drill
 def test_a_box_that_lands_flat_bounces_as_one() -> None:
     """The corners of a box that lands flat share the time, energies and height of its bounce: e² of its fall."""
     found = bounces_of(truth(_box(), np.linspace(0.0, 0.6, 7)))

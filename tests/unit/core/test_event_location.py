@@ -20,6 +20,7 @@ def test_a_rise_within_a_step_is_never_taken_for_none():
     assert first_rise(lambda t: functions(t)[:, 1], 0.0, 1.0) is None
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("frequency", np.linspace(0.1, 12, 60))
 def test_an_oscillation_is_left_to_more_points(frequency):
     """An oscillation of up to two periods a step, many times what an integrator resolves, is never called negative."""

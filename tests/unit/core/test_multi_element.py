@@ -33,6 +33,8 @@ def balls() -> Scene:
     return dataclasses.replace(scene, elements=(one, second))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("engine", ["projection", "reduced", "exudyn", "pinocchio"])
 def test_each_element_moves_as_it_does_alone(balls: Scene, engine: str) -> None:
     """In a scene of two elements each follows, digit for digit, the path of a scene that holds it alone."""
@@ -52,6 +54,8 @@ def mixed(balls: Scene) -> Scene:
     return dataclasses.replace(balls, elements=(balls.elements[0], pendulum))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     "engine",
     [

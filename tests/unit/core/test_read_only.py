@@ -43,6 +43,7 @@ def cached(kind: type) -> set[str]:
     return {name for base in kind.__mro__ for name, value in vars(base).items() if hasattr(value, "attrname")}
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", SCENES)
 def test_arrays_of_scenes_are_read_only(name: str) -> None:
     """No array of a scene can be written, be it given or computed once; an engine's copy is no exception."""
@@ -67,6 +68,7 @@ def test_read_only_at_any_depth() -> None:
     assert not any(array.flags.writeable for array in inside)
 
 
+@pytest.mark.drill
 def test_truths_are_read_only() -> None:
     """No variable of a truth can be written; a deep copy can."""
     found = truth(load_scene("inclined_plane"), np.linspace(0, 0.1, 3))

@@ -90,6 +90,7 @@ def test_inertia_ratio_reaches_the_inertia() -> None:
     assert Ball("shell", 0.1, 3.0, inertia_ratio=2 / 3).inertia == pytest.approx(0.02, rel=1e-15)
 
 
+@pytest.mark.drill
 def test_digest_follows_the_motion_alone() -> None:
     """The digest changes with every number that changes the motion, and with nothing else."""
     scene = load_scene("sphere_in_cylinder")

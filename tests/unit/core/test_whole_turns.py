@@ -30,6 +30,8 @@ def fine() -> dict[str, float]:
     return {"q.pivot": float(ends["pendulum"]["q.pivot"][-1]), "gamma": float(ends["tilted_cylinder"]["gamma"][-1])}
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of("tilted_cylinder-gamma-projection")
 @pytest.mark.drill_of("pendulum-q.pivot-truth")
 @pytest.mark.parametrize(
@@ -49,6 +51,8 @@ def test_two_samples_are_enough_for_an_engine(engine: str, scene: str, angle: st
     assert UNCERTAIN not in run[angle].attrs
 
 
+@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_command_counts_them_too(fine: dict[str, float], proofroll: object) -> None:
     """So does a run in a worker, and the trajectory has the times that were asked for and no others."""
     import json
@@ -109,6 +113,7 @@ def test_a_built_engine_is_not_blamed(fine: dict[str, float]) -> None:
     assert observables_of(reference, off)["q.pivot"][-1] == pytest.approx(fine["q.pivot"] + 0.1, abs=1e-6)
 
 
+@pytest.mark.drill
 def test_turns_that_nobody_knows_are_no_difference() -> None:
     """Of two runs whose samples do not tell turns an angle is apart by less than a turn; what is sure is not turned."""
     scene = load_scene("pendulum")

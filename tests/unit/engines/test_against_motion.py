@@ -55,6 +55,7 @@ def true_spins() -> dict[str, Any]:
     return {law: spins("truth", law) for law in ("motion", "turning")}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("law", ["motion", "turning"])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_each_engine_has_both_laws(engine: str, law: str, true_spins: dict[str, Any]) -> None:
@@ -64,6 +65,7 @@ def test_each_engine_has_both_laws(engine: str, law: str, true_spins: dict[str, 
     assert float(np.abs(run - true_spins[other]).max()) > 3.0
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("projection[formulation=dependent,rtol=1e-8]-True-4")
 @drill
 @pytest.mark.parametrize(
@@ -93,6 +95,7 @@ def test_motion_is_that_over_a_plane_that_turns(engine: str, first: bool, rate: 
     assert apart < 0.02 * float(np.abs(turned - true).max())
 
 
+@pytest.mark.nightly
 @pytest.mark.nightly_of("mujoco[formulation=geoms,preset=tuned,dt=5e-4]", "projection[formulation=dependent,rtol=1e-8]")
 @drill
 @pytest.mark.parametrize(

@@ -51,6 +51,7 @@ def by_the_law(pair: Pair, until: float) -> NDArray[np.float64]:
     return np.asarray(solve_ivp(rates, (0.0, until), np.array(THROWN), rtol=1e-11, atol=1e-12).y[:, -1])
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("rolling", [0.0, 1e-3])
 @pytest.mark.parametrize(

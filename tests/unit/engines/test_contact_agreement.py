@@ -117,6 +117,8 @@ def scene_of(name: str, mechanism: Mechanism) -> Scene:
     return Scene(name, "", (MechanismElement(mechanism),))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "rod-mujoco[formulation=geoms,preset=tuned,dt=2e-4]-0.08-0.001",
     "block-mujoco[formulation=geoms,preset=tuned,dt=2e-4]-0.08-0.001",
@@ -178,6 +180,8 @@ def test_a_cylinder_that_lands_on_its_end_ends_a_run_with_one_point() -> None:
     assert "has one point" in run.attrs["message"]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("e", [0.0, 1.0])
 def test_dead_and_perfect_impacts(e: float) -> None:
     """With e = 0 the ball stays where it lands, with 1 it comes back to its height, in impulses as in truth."""

@@ -28,6 +28,7 @@ def built(setting: str, scene: str) -> Any:
     return plugin.build(load_scene(scene), plugin.presets[formulation][preset])
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", [*CONTACTS, *LAWS])
 @pytest.mark.parametrize(
     "setting", ["projection dependent default", "pinocchio impulses matched", "pinocchio impulses tuned"]
@@ -54,6 +55,8 @@ def test_the_projection_has_the_first_forces_of_contact(name: str) -> None:
     np.testing.assert_allclose(force[known], element.first_press[known], atol=1e-8)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("setting", "place", "part"), [("pinocchio impulses matched", 1.6e-3, 1e-6), ("exudyn spheres matched", 1e-4, 1e-3)]
 )
@@ -66,6 +69,8 @@ def test_three_feet_at_rest_share_the_weight_by_their_levers(setting: str, place
     np.testing.assert_allclose(run.sample().contact_force[:, 2], N, rtol=part)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.nightly
 @pytest.mark.drill_of("pinocchio impulses tuned")
 @pytest.mark.parametrize("setting", ["pinocchio impulses tuned", "mujoco geoms tuned"])
 def test_rows_that_turn_leave_no_contact_open(setting: str) -> None:
@@ -97,6 +102,8 @@ def test_a_joint_holds_without_creep_and_tells_its_friction(setting: str) -> Non
         assert sample.joint_force is None or sample.joint_force[0, 2] == pytest.approx(force, abs=1e-6)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("projection dependent matched-1e-10-1e-09-0.5")
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize(

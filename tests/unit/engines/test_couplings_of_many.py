@@ -14,6 +14,8 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("mechanism", "engine", "formulation", "close"),
     [

@@ -57,6 +57,7 @@ def slider(gravity: float = 0.0, **more: Any) -> Mechanism:
     return Mechanism((Body("b", 1.0, inertia=ONES),), (guide,), gravity=(0, 0, -gravity))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("model", CLOSE, ids="-".join)
 @pytest.mark.parametrize("actuator", ACTUATORS)
 def test_efforts_are_those_of_the_scene(actuator: Actuator, model: tuple[str, str, str]) -> None:
@@ -93,6 +94,7 @@ COUPLED = [
 ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("model", COUPLED, ids="-".join)
 @pytest.mark.parametrize("kind", ["prismatic", "revolute"])
 def test_couplings_bear_their_forces(kind: Any, model: tuple[str, str, str]) -> None:

@@ -44,6 +44,8 @@ def four_bar(kind: str, rpy: tuple[float, float, float]) -> Mechanism:
     return Mechanism(tuple(bodies), joints, loops=(loop,))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (-np.pi / 2, 0.0, 0.0), TURNED])
 @pytest.mark.parametrize("kind", ["revolute", "spherical", "cylindrical"])
 def test_a_loop_of_any_kind_that_turns_closes_a_four_bar_in_any_plane(kind, rpy):

@@ -61,6 +61,8 @@ def happened(path: Path, *expected: str, at: float) -> None:
     assert [event.time for event in path.events] == pytest.approx([at] * len(expected), abs=1e-12)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.drill_of("by_truth")
 @BOTH
 def test_friction_of_a_joint_and_of_a_contact_stop_a_foot(follow: Follow) -> None:
@@ -72,6 +74,8 @@ def test_friction_of_a_joint_and_of_a_contact_stop_a_foot(follow: Follow) -> Non
     happened(path, "rest sole", "stick rail", at=1 / slowed)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @BOTH
 def test_a_foot_that_slides_rebounds_from_a_stop(follow: Follow) -> None:
     """A stop returns half of the speed, and friction at the foot turns with it."""
@@ -82,6 +86,8 @@ def test_a_foot_that_slides_rebounds_from_a_stop(follow: Follow) -> None:
     happened(path, "impact rail", "turn sole", at=hit)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @BOTH
 def test_a_smooth_foot_is_pressed_against_a_stop(follow: Follow) -> None:
     """A stop that returns nothing bears what pulls the foot on."""
@@ -91,6 +97,8 @@ def test_a_smooth_foot_is_pressed_against_a_stop(follow: Follow) -> None:
     happened(path, "impact rail", at=(np.sqrt(1 + 2 * 3.0 * 0.1) - 1) / 3.0)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @BOTH
 def test_a_limit_of_an_effort_is_not_stepped_across(follow: Follow) -> None:
     """A force that grows in time up to its limit, within a step, moves a foot by a cubic, then by a parabola."""
@@ -103,6 +111,7 @@ def test_a_limit_of_an_effort_is_not_stepped_across(follow: Follow) -> None:
     assert path.forces == pytest.approx([2.4, 4.0], abs=1e-12)
 
 
+@pytest.mark.drill
 def test_a_stop_and_a_floor_that_rubs_share_a_load() -> None:
     """Where friction holds a foot beside a stop only the sum of both is unique: it is what pulls."""
     mechanism = foot_on_rail(limits=(-1.0, 0.1), pull=3.0)

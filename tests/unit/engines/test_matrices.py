@@ -56,6 +56,7 @@ def test_the_matrices_are_those_of_the_equations() -> None:
     )
 
 
+@pytest.mark.drill
 def test_a_command_prints_them() -> None:
     """Names of velocities, M, h and g of an engine and their differences from the truth's are one document."""
     answer = CliRunner().invoke(app, ["run", "double_pendulum", "--engine", "pinocchio", "--matrices", "--json"])

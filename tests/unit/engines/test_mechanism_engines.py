@@ -118,6 +118,7 @@ def test_reactions_at_the_start(formulation):
     assert np.abs(found - expected)[said].max() < tolerance * np.abs(expected).max()
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("formulation", WITH_REACTIONS)
 @pytest.mark.parametrize("kind", held_bodies.LOOPS)
 def test_a_loop_holds_as_the_joint_does(formulation, kind):
@@ -164,6 +165,8 @@ BOUNDS = [
 ]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("formulation", "name", "until", "options", "position", "reaction"), BOUNDS)
 def test_errors_stay_below_what_is_declared(formulation, name, until, options, position, reaction):
     """Positions and determinate reactions of the scenes are as near to the truth as the engine is known to come."""
@@ -187,6 +190,7 @@ def test_a_spring_winds_up_more_than_a_turn(formulation):
     assert error < {"joints": 1e-8, "redundant": 1e-3}.get(formulation, 1e-11)  # RK4 and order 2 at 1e-3 s
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("formulation", ["joints", "redundant", "null_space", "dependent"])
 @pytest.mark.parametrize("name", ["slider_crank", "four_bar", "bricard"])
 def test_mobility_is_that_of_the_geometry(formulation, name):
@@ -222,7 +226,7 @@ def test_the_inertia_of_a_drive_slows_its_coordinate(formulation):
     assert abs(slow) < 0.8 * abs(plain)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_singular_pose_is_told_with_time_and_pose() -> None:
     """A run whose loops lose a row ends there, before its steps shrink to nothing, and says when and where."""
     run = simulate(load_scene("four_bar", windows=1), "projection", until=1.0)

@@ -139,6 +139,7 @@ def test_what_only_some_models_need_is_refused_in_words():
         assert runs.build(formulation, mechanism).sample().p_WB[1, 0] == pytest.approx(1.0)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", ["joints", "redundant", "null_space", "dependent"])
 def test_a_missing_spring_shows_in_the_first_reactions(formulation):
     """Andrews' spring pulls at a dead centre and accelerates nothing at the start; bearings and loops feel it."""

@@ -51,6 +51,7 @@ def numbers(sample: MechanismSample) -> np.ndarray:
     return np.concatenate([np.ravel(part) for part in parts])
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("model", "scene", "order"),
     [
@@ -68,6 +69,7 @@ def test_order_hangs_on_the_scene(model: tuple[str, str], scene: Scene, order: i
 
 
 # z's range is 0.12 m. Each bound is about 1.5 times what MuJoCo 4.0 gives, so that a change of the method is seen.
+@pytest.mark.nightly
 @pytest.mark.drill_of("formulation=geoms,preset=tuned,dt=5e-4")
 @pytest.mark.parametrize("engine", ["formulation=chart,dt=5e-4", "formulation=geoms,preset=tuned,dt=5e-4"])
 def test_reactions_are_the_truths(engine: str) -> None:
@@ -79,6 +81,8 @@ def test_reactions_are_the_truths(engine: str) -> None:
     assert error(CYLINDER, engine, "F3", **ROLLING) < 0.01
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of(
     "formulation=geoms,preset=tuned-parameters1-0.0002", "formulation=geoms,preset=tuned-parameters2-0.0002"
 )
@@ -95,6 +99,7 @@ def test_other_motions_in_the_cylinder(engine: str, parameters: dict[str, float]
     assert error(CYLINDER, engine, "z", **parameters) < bound
 
 
+@pytest.mark.drill
 def test_default_contact_is_wrong_at_every_step() -> None:
     """With MuJoCo's default contact the ball on joints is off by centimetres at every step."""
     for dt in (2e-3, 5e-4):

@@ -102,6 +102,7 @@ def test_wrong_geometry_and_friction_are_told():
         assert quantity in [line.quantity for line in lines if not line.holds], quantity
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", ["sled", "ladder", "free_turntable", "rattleback", "tilted_disc", "flick"])
 @pytest.mark.parametrize("settings", ["default", "matched", "tuned"])
 def test_the_delassus_matrix_is_read_back(name, settings):
@@ -153,6 +154,7 @@ def test_geoms_have_no_mass():
     np.testing.assert_allclose(built.inertia, [np.diag((0.02, 0.03, 0.04))], atol=1e-15)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", ["default", "matched", "tuned"])
 def test_forces_at_rest_bear_the_weight(name):
     """Forces on the first geometry's body hold it; turned round, the pair tells those on the floor's side."""
@@ -308,6 +310,7 @@ def test_the_armature_of_damping_needs_euler_and_joints():
             )
 
 
+@pytest.mark.drill
 def test_what_sticks_is_not_lifted_by_the_correction_of_the_cone():
     """A ball that rolls on a turning table presses with its weight: no friction is missed, and none is corrected."""
     scene = load_scene("free_turntable")

@@ -24,6 +24,8 @@ def run(name: str, engine: str, until: float, every: float, **parameters: Any) -
     return motion["p_WB"].values[:, 0], motion["v_WB"].values[:, 0]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("engine", GEOMS)
 def test_a_ball_stops_where_its_resistance_stops_it_and_rests(engine: str) -> None:
     """Its way is that of an even braking but for half a step of it, and nothing moves afterwards."""
@@ -35,6 +37,8 @@ def test_a_ball_stops_where_its_resistance_stops_it_and_rests(engine: str) -> No
     assert np.abs(p[9:] - p[-1]).max() < 1e-9
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("engine", GEOMS)
 def test_a_ball_rolls_down_by_what_resistance_leaves(engine: str) -> None:
     """Its acceleration is g (sin - f/a cos) / 1.4, and on a slope below f/a it stays."""
@@ -46,6 +50,7 @@ def test_a_ball_rolls_down_by_what_resistance_leaves(engine: str) -> None:
     assert np.abs(v[1:]).max() < 1e-7  # it creeps, as its contact is soft
 
 
+@pytest.mark.drill
 def test_what_slips_is_resisted_too() -> None:
     """A ball that slides and begins to turn has the moment while it slips, as its truth has."""
     parameters = {"rolling_resistance": 2e-3}
@@ -57,6 +62,7 @@ def test_what_slips_is_resisted_too() -> None:
     assert np.abs(true["w_WB"].values).max() > 10
 
 
+@pytest.mark.nightly
 def test_a_bowl_keeps_second_order() -> None:
     """Half the step has a quarter of the error with curvature and resistance."""
     scene, grid = load_scene("bowl", rolling_resistance=1e-3), {"until": 0.2, "every": 0.04}
@@ -69,7 +75,7 @@ def test_a_bowl_keeps_second_order() -> None:
     assert 3.5 < errors[0] / errors[1] < 4.5
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_the_articles_ball_slips_when_its_truth_does() -> None:
     """With resistance and friction of 0.35 the ball in the cylinder slips at 1.72018 s, by its truth."""
     scene = load_scene("sphere_in_cylinder", speed=4, mu_static=0.35, rolling_resistance=F)

@@ -23,6 +23,7 @@ PINOCCHIO = load_engine("pinocchio")
 PRESETS = PINOCCHIO.presets["impulses"]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("units", [Units(1.0, 2.0**20, 1.0), Units(2.0**-10, 1.0, 1.0), Units(1.0, 1.0, 2.0**7)])
 @pytest.mark.parametrize("preset", ["default", "matched", "tuned"])
 def test_an_error_of_the_solver_does_not_hang_on_units(preset: str, units: Units) -> None:
@@ -61,6 +62,7 @@ def test_pgs_is_refused_where_it_returns_wrong_impulses() -> None:
     run.advance(0.33)
 
 
+@pytest.mark.drill
 def test_a_solver_that_gives_up_ends_the_run() -> None:
     """A solver that does not find the impulses ends the run, and its time is said."""
     run = PINOCCHIO.build(load_scene("free_turntable"), replace(PRESETS["matched"], solver="pgs"))
@@ -85,6 +87,7 @@ def _on_a_guide(**law: Any) -> Mechanism:
     return Mechanism((Body("mass", 1.0, inertia=(0.1, 0.1, 0.1)),), (joint,))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("dt", "error"), [(1e-2, 4.5e-2), (1e-3, 4.4e-3)])
 def test_dry_friction_is_of_first_order(dt: float, error: float) -> None:
     """A mass on a spring that rubs is off by as much as an impulse a step leaves, and samples change nothing."""
@@ -114,6 +117,7 @@ def test_an_impulse_of_a_stop_is_no_friction() -> None:
     assert run.sample().stop[0] == 0.0
 
 
+@pytest.mark.drill
 def test_a_fast_ball_on_a_curved_wall_keeps_its_rolling_resistance():
     """Where the wall turns away faster than gravity pulls, a step's approach is no impact, which has no such moment."""
     scene = load_scene("sphere_in_cylinder", speed=8.0, rolling_resistance=5e-4)

@@ -97,6 +97,7 @@ def test_a_stop_is_located_without_coming_near_it_each_time_anew() -> None:
     assert motion.located < 1000  # rates: 675, and 1,565 where each trial begins with the step that holds the stop
 
 
+@pytest.mark.drill
 def test_modes_that_end_at_once_end_the_run() -> None:
     """Twenty changes without any progress are an endless loop."""
     with pytest.raises(Diverged, match="bounces alternate without end"):

@@ -47,6 +47,8 @@ def test_a_sled_turns_about_a_foot_and_rests() -> None:
     np.testing.assert_allclose(run.sample().contact_force[:, 2], N, rtol=1e-6)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("name", "kind", "contact"),
     [
@@ -126,7 +128,7 @@ def bounces(until: float) -> tuple[float, list[float]]:
     return y[0], changes
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_rod_on_a_rubbing_hinge_bounces_as_an_own_solver_says() -> None:
     """Both routes of the truth, and projection at steps of 2e-3 s, have the angle and events of one own equation."""
     angle, changes = bounces(0.45)
@@ -144,6 +146,7 @@ def test_a_rod_on_a_rubbing_hinge_bounces_as_an_own_solver_says() -> None:
         assert [event.time for event in events] == pytest.approx(times, abs=bound)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("engine", "formulation", "preset", "bound"),
     [
@@ -164,6 +167,7 @@ def test_a_clamped_servo_pushes_through_a_contact(engine: str, formulation: str,
     assert sample.effort == pytest.approx([0.6], abs=1e-6)
 
 
+@pytest.mark.drill
 def test_first_steps_into_an_impact_are_no_evidence() -> None:
     """A ball a tenth of a millimetre above the floor lands within steps of 9 ms, which say nothing of its start."""
     for height, judged in ((0.0501, False), (0.55, True)):
@@ -172,6 +176,7 @@ def test_first_steps_into_an_impact_are_no_evidence() -> None:
         assert all(line.holds for line in first_steps(PROJECTION, scene, replace(DEFAULT, dt=1e-4)))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("part", [-1e-6, 0.0, 1e-6])
 def test_a_graze_of_a_stop_passes_no_stop(part: float) -> None:
     """A throw that ends at its stop comes down again, hit or not, with no more than its impact can change."""
@@ -200,6 +205,8 @@ def test_a_graze_within_a_step_is_an_impact() -> None:
     assert impact.time == pytest.approx(0.124832443080, abs=1e-9)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("dt", [0.01, 0.003])
 def test_an_impact_takes_an_effort_off_its_limit(dt: float) -> None:
     """A foot that falls with a servo at its limit hits the floor once, and then stands with its whole weight."""
@@ -217,6 +224,7 @@ def test_an_impact_takes_an_effort_off_its_limit(dt: float) -> None:
     assert run.sample().contact_force[0, 2] == pytest.approx(1.5 * 9.81)
 
 
+@pytest.mark.drill
 def test_feet_that_hold_together_share_their_friction() -> None:
     """A sled at rest on a slope stays, though the least share of friction is more than its least loaded foot bears."""
     mechanism = mechanism_of(load_scene("sled_on_slope"))
@@ -228,7 +236,7 @@ def test_feet_that_hold_together_share_their_friction() -> None:
     assert np.abs(run.sample().v_WB).max() < 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_foot_that_turns_within_a_step_goes_on() -> None:
     """At the end of a slide a foot may slip backwards after one coarse step: it has not stopped, and all rest soon."""
     run = PROJECTION.build(load_scene("sled_on_slope"), replace(DEFAULT, dt=4e-3))
@@ -238,7 +246,7 @@ def test_a_foot_that_turns_within_a_step_goes_on() -> None:
     assert [event.kind for event in run.events()] == ["stick", "rest", "rest"]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_slip_that_ends_while_it_turns_sticks() -> None:
     """A foot whose slip ends within a fixed step becomes the pivot: it does not circle about zero, step after step."""
     run = PROJECTION.build(load_scene("sled_on_slope"), DEFAULT)
@@ -303,6 +311,7 @@ def test_a_ball_that_hardly_falls_comes_to_rest() -> None:
     assert 1 < impacts < 10
 
 
+@pytest.mark.nightly
 def test_an_impact_leaves_a_distant_contact_closed() -> None:
     """A ball that rests on a slope turned in space feels nothing of another ball's impact, and stays."""
     bodies = tuple(Body(name, 1.0, inertia=(1e-3, 1e-3, 1e-3)) for name in ("resting", "falling"))
@@ -326,6 +335,7 @@ def test_an_impact_leaves_a_distant_contact_closed() -> None:
     assert {event.name for event in run.events()} == {"falling"}
 
 
+@pytest.mark.nightly
 def test_a_contact_that_opens_does_not_hit_at_once() -> None:
     """A finger's ball slips, leaves it, and is gone: what the method's error left of overlap there is no impact."""
     run = PROJECTION.build(load_scene("flick"), replace(DEFAULT, dt=2e-3))
@@ -349,7 +359,7 @@ def test_a_ball_that_rolls_across_a_slope_begins_to_slip_down_it() -> None:
     assert run.sample().v_WB[0] == pytest.approx([0.1 * pull * normal[2], -speed, -0.1 * pull * normal[0]], abs=1e-9)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_corners_of_a_face_land_together() -> None:
     """A box that falls from an edge back onto its face comes to rest by one impact of the other two corners."""
     tilt, half = 0.1, np.array([0.2, 0.1, 0.1])
@@ -372,6 +382,8 @@ def test_corners_of_a_face_land_together() -> None:
     np.testing.assert_allclose([*sample.v_WB[0], *sample.w_WB[0]], 0.0, atol=1e-12)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize(("height", "error"), [(0.15, Refused), (0.2, Diverged)])
 def test_a_cylinder_that_stands_on_its_end_is_refused(height: float, error: type[Exception]) -> None:
     """One point of an edge holds no end that lies flat: projection says so at the start, or where it lands."""

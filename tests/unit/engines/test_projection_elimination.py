@@ -123,6 +123,7 @@ def test_elimination_joint_by_joint_is_that_by_sums(violated):
         np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not available(), reason="heyoka is not installed")
 @pytest.mark.parametrize(
     "mechanism",

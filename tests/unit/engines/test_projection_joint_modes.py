@@ -27,7 +27,7 @@ def place(run):
     return float(run.sample().p_WB[0, 2])
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("options", "tolerance"),
     [({}, 1e-10), pytest.param({"integrator": "rk4", "dt": 1e-3}, 1e-7, marks=pytest.mark.nightly)],
@@ -61,6 +61,7 @@ def test_a_pendulum_rubs_to_rest():
     assert 2 * np.arctan2(axis[1:].sum(), axis[0]) == pytest.approx(true["values"]["q.pivot"], abs=1e-9)
 
 
+@pytest.mark.drill
 def test_a_mass_that_hardly_falls_comes_to_rest():
     """Rebounds from the height of a file's last digits are summed, as are the last ones of any fall."""
     run = runs.build("dependent", slider(q0=(1e-12,), limits=(0.0, 2.0), restitution=0.5))
@@ -68,6 +69,7 @@ def test_a_mass_that_hardly_falls_comes_to_rest():
     assert [event.kind for event in run.events()] == ["impact", "impact"]
 
 
+@pytest.mark.drill
 def test_a_joint_that_is_held_feels_the_others():
     """The first of two rods is held while the second swings, until what that asks of its friction is too much."""
     rod = {"mass": 1.0, "com": (0.0, -0.5, 0.0), "inertia": (1 / 12, 0.001, 1 / 12)}
@@ -95,6 +97,7 @@ def test_a_joint_that_is_held_feels_the_others():
     assert abs(truth.sample().joint_torque[0, 2]) == pytest.approx(6.0, abs=1e-7)
 
 
+@pytest.mark.drill
 def test_friction_in_a_loop_is_a_drive_against_the_motion():
     """A crank drive whose shaft rubs moves as one whose shaft is driven backwards, until it turns."""
     made = runs.model("slider_crank")
@@ -122,6 +125,8 @@ def test_a_loop_with_friction_turns_when_it_should():
     assert (turn.kind, turn.name) == ("turn", "shaft")
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("options", "tolerance"), [({}, 1e-12), ({"integrator": "rk4", "dt": 4e-3}, 1e-7)])
 def test_an_effort_meets_its_limit_when_it_should(options, tolerance):
     """The clamp of a servo is a switch: its times are exact to the order of the method, and so is what follows."""
@@ -137,6 +142,7 @@ def test_an_effort_meets_its_limit_when_it_should(options, tolerance):
     assert run.sample().v_WB[0, 0] == pytest.approx(speed, abs=20 * tolerance)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("target", [Formula("2*sin(9*t)"), Table((0.0, 0.15, 0.3), (0.0, 2.0, -2.0))])
 def test_friction_a_stop_a_limit_and_a_target_in_time_switch_together(target):
@@ -152,6 +158,7 @@ def test_friction_a_stop_a_limit_and_a_target_in_time_switch_together(target):
     assert [(event.kind, event.name) for event in run.events()] == [(e.kind, e.name) for e in truth.events]
 
 
+@pytest.mark.nightly
 def test_a_rack_and_pinion_on_a_spring():
     """A coupling of a hinge and a slide is one row more: ratio, force and motion are those of one oscillator."""
     joints = (
@@ -169,6 +176,7 @@ def test_a_rack_and_pinion_on_a_spring():
     assert (built.rows, built.rank, built.mobility) == (11, 11, 1)
 
 
+@pytest.mark.drill
 def test_a_coupling_and_a_stop_hold_together():
     """Of two geared wheels one meets its stop: both stop, and the gear carries what drives the other."""
     made = runs.model("gear_pair")

@@ -22,6 +22,7 @@ def motion_of(scene: str, parameters: dict[str, Any], time: float) -> ContactMot
     return motion
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("scene", "parameters", "time"),
     [
@@ -55,6 +56,7 @@ def test_a_program_has_the_motion_of_numpy(scene: str, parameters: dict[str, Any
         assert point.gap == pytest.approx(other.gap, abs=1e-14)
 
 
+@pytest.mark.drill
 def test_a_slip_without_a_direction_of_its_own_is_left_to_numpy() -> None:
     """A program says nothing of a slip that counts as rest, nor of one against its direction at the step's start."""
     motion = motion_of("sphere_in_cylinder", SLIPPERY, 0.1)
@@ -66,6 +68,7 @@ def test_a_slip_without_a_direction_of_its_own_is_left_to_numpy() -> None:
     assert program.at(y, slipping) is None
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "bowl", "flick", "dominoes", "turntable", "tilted_disc"])
 def test_mechanisms_with_few_plain_contacts_are_recorded(scene: str) -> None:
     """Few bodies with spheres on walls by formulas are, after some steps in a mode; drives, boxes and discs are not."""

@@ -69,6 +69,8 @@ def test_another_precision_is_one_line() -> None:
         precision_of(SimpleNamespace(precision="half"))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of("double_pendulum")
 @pytest.mark.parametrize("name", SCENES)
 def test_errors_stay_errors(name: str) -> None:
@@ -83,6 +85,7 @@ def test_errors_stay_errors(name: str) -> None:
     assert errors["single"] > 10 * errors["double"]
 
 
+@pytest.mark.drill
 def test_a_declared_precision_is_no_cause() -> None:
     """A run in float32 has that as a cause of its difference only where nobody said so."""
     scene, times = load_scene("double_pendulum"), np.linspace(0, 0.5, 51)
@@ -204,6 +207,7 @@ def test_a_comparison_tells_precision_and_floor(
     assert ", f32, dt 1e-3 s reached 0.01 s" in out
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     "check",
     [

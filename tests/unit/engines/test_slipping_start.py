@@ -34,6 +34,7 @@ def true(resists: bool) -> tuple[Scene, xr.Dataset]:
     return scene, simulate(scene, "truth", until=0.6, every=0.05)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("start1-pinocchio[formulation=impulses]-0.0005-0.001")
 @pytest.mark.parametrize(("start", "engine", "speed", "time"), ENGINES)
 def test_slip_that_turns(start: dict[str, Any], engine: str, speed: float, time: float) -> None:

@@ -67,6 +67,7 @@ def growing_push() -> tuple[Scene, tuple[float, ...]]:
     return sled("800*t"), (FRICTION * MASS * 9.81 / 800,) * 3
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("moving", [ball, growing_push])
 def test_a_slip_is_located_within_two_steps(moving: Callable[[], tuple[Scene, tuple[float, ...]]], engine: str) -> None:
@@ -79,6 +80,8 @@ def test_a_slip_is_located_within_two_steps(moving: Callable[[], tuple[Scene, tu
     assert max(event.time_high - event.time_low for event in events) <= 2 * STEP * (1 + 1e-9)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_slip_between_two_samples_is_seen(engine: str) -> None:
     """A gentle push moves the sled and friction stops it, both between the same two samples."""
@@ -97,6 +100,7 @@ def test_a_slip_between_two_samples_is_seen(engine: str) -> None:
     assert [event.time for event in events] == pytest.approx([start] * 3 + [stop] * 3, abs=2 * STEP)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_unbounded_friction_never_slips(engine: str) -> None:
     """A ball that rolls in the cylinder creeps in steps of first order, and has no event."""

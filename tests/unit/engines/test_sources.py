@@ -33,6 +33,7 @@ def setting(node: ast.expr) -> bool:
     return isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "self"
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("engine", sorted(path.name for path in ENGINES.iterdir() if path.is_dir()))
 def test_no_adapter_knows_a_scene_or_a_surface(engine: str) -> None:
     """No adapter names a scene, or a class or kind of surface: what it asks, it asks of any."""

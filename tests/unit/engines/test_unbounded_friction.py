@@ -24,6 +24,7 @@ def test_a_pair_that_never_slips_starts_without_slip() -> None:
         check_contacts(on_plane(slip=1.0))
 
 
+@pytest.mark.drill
 def test_an_impact_stops_all_slip() -> None:
     """A ball leaves an impact without slip, with its normal speed times its restitution."""
     fall, n = 9.81 * 0.96, np.array([0.28, 0.0, 0.96])

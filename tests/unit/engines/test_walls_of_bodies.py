@@ -45,6 +45,8 @@ def leaning_wheel(friction: float) -> Mechanism:
     return Mechanism((Body("wheel", 2.0, inertia=(0.12, 0.06, 0.12)),), (joint,), geometries=shapes, pairs=pairs)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("friction", [math.inf, 100.0, 5.0])
 @pytest.mark.parametrize(
     ("preset", "order", "errors"),
@@ -64,6 +66,8 @@ def test_impulses_hold_a_ball_by_any_friction(
     assert 0.9 * 2**order < off[0] / off[1] < 1.25 * 2**order
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("friction", [math.inf, 100.0])
 def test_impulses_hold_a_wheel_by_any_friction(friction: float) -> None:
     """A wheel whose contact gives way unequally rolls with any friction as with one that is just enough."""
@@ -113,6 +117,7 @@ def test_a_hollow_sphere_in_exudyn_stands_for_a_bore(dt: float) -> None:
     assert float(np.linalg.norm(run.sample().p_WB[0] - place_in_bore(0.2))) < 100 * dt**2 + 5e-6
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("kind", list(WALLS))
 @pytest.mark.parametrize("setting", ["mujoco geoms matched", "mujoco geoms tuned", "exudyn spheres matched"])
 @pytest.mark.parametrize("swapped", [False, True])
@@ -156,6 +161,8 @@ def test_a_ball_at_the_centre_of_a_bowl_falls(setting: str) -> None:
     assert run.sample().p_WB[0] == pytest.approx([0, 0, -GRAVITY * 0.1**2 / 2], abs=GRAVITY * 0.1 * 1e-3)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("bowl-0.001-4e-06")
 @pytest.mark.parametrize(
     ("name", "resistance", "error"),

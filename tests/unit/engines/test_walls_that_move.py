@@ -68,6 +68,7 @@ def test_a_table_turns_under_a_ball(engine: str) -> None:
     assert float(np.abs(run["drive.axle"].to_numpy()).max()) < 5e-3
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of(
     "mujoco[formulation=geoms,preset=tuned]-shaken bore-0.0001-0.1", "projection-turntable-1e-07-0.005"
 )
@@ -87,6 +88,8 @@ def test_a_ball_on_a_driven_wall_moves_as_the_truth_says(engine: str, name: str,
     assert max(drive, errors["contact_forces"]) < push
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of("projection")
 @pytest.mark.parametrize("engine", [ENGINES[0], "pinocchio[formulation=impulses,dt=2e-3]", "projection"])
 def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
@@ -107,6 +110,8 @@ def test_a_parcel_is_carried_along_by_a_belt(engine: str) -> None:
     np.testing.assert_allclose(run["drive.run"].to_numpy()[1:], pull[1:], atol=1e-5)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("preset", ["matched", "tuned"])
 def test_pinocchio_tells_the_friction_of_a_driven_table_at_the_start(preset: str) -> None:
     """Forces at the start belong to the motion's place at the start, also where steps take all at their middle."""
@@ -117,6 +122,7 @@ def test_pinocchio_tells_the_friction_of_a_driven_table_at_the_start(preset: str
         assert abs(run[force].values - right[force].values).max() < 2e-3  # N
 
 
+@pytest.mark.nightly
 def test_exudyns_triangle_of_a_turning_plane_does_not_press_by_round_off() -> None:
     """It is small and stays under the ball; Newton's method did not converge with corners a kilometre off."""
     scene, grid = load_scene("turntable"), {"until": 0.1, "every": 0.05}
@@ -127,6 +133,7 @@ def test_exudyns_triangle_of_a_turning_plane_does_not_press_by_round_off() -> No
     assert abs(run["N"].values - right["N"].values).max() < 1e-9  # N; 1e-7 with corners a kilometre off
 
 
+@pytest.mark.drill
 def test_exudyns_triangle_of_a_moving_plane_follows_a_sphere_that_goes_far() -> None:
     """A ball that slides by twenty of its radii over a plane that a motion lifts stays on it."""
     joints = (
@@ -142,6 +149,8 @@ def test_exudyns_triangle_of_a_moving_plane_follows_a_sphere_that_goes_far() -> 
     np.testing.assert_allclose(place, [0.4, 0.0, 0.03], atol=1e-6)  # m; it fell by 25 mm beside the triangle
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of("0.1")
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
 def test_the_projection_solver_rolls_a_ball_on_a_driven_table(tilt: float) -> None:

@@ -61,6 +61,7 @@ def test_projection(f: float) -> None:
         assert bool(np.any(engine._ball.resistance(kin, 1.0))) == (f > 0)
 
 
+@pytest.mark.nightly
 def test_the_orientation_in_the_rotating_frame_is_a_quadrature() -> None:
     """Asked for, the orientation turns with the spin, is that of the Euler angles, and leaves the motion alone."""
     with_it, angles, without = (
@@ -119,6 +120,8 @@ def test_mujoco(f: float, monkeypatch: pytest.MonkeyPatch) -> None:
     assert any(callback is not None for callback in given) == (f > 0)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize(("condim", "coefficients"), [(4, [5e-3]), (6, [5e-3, 1e-4])])
 def test_mujoco_contact_of_more_dimensions(condim: int, coefficients: list[float]) -> None:
     """Friction against turning and rolling is in the contact that MuJoCo makes, is told, and ruins the motion."""

@@ -160,6 +160,7 @@ def test_tolerances_of_another_form(text: object) -> None:
     assert caught.value.field == "claim: z"
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -277,6 +278,7 @@ def test_a_comparison_without_rows(tmp_path: Path) -> None:
         load_comparison(str(tmp_path / "claim.toml"))
 
 
+@pytest.mark.drill
 def test_an_unknown_comparison() -> None:
     """An unknown comparison is answered with those that exist, a mistyped name with what resembles it."""
     with pytest.raises(InputError, match=r"there is no such comparison or scene; choose one of paper, .*, … or a file"):

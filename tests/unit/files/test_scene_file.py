@@ -65,6 +65,7 @@ def test_every_parameter_has_unit_meaning_and_source(name: str) -> None:
     assert len(set(symbols)) == len(symbols)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", scene_names())
 def test_every_parameter_reaches_the_mechanics(name: str) -> None:
     """Changing any parameter changes the scene: none is decoration."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import sys
 import zipfile
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -34,21 +36,32 @@ ALL_KINDS = xr.Dataset(
     {"count": 3, "half": np.float32(0.5), "message": "", "list": np.array([1, 2, 3]), "nothing": np.nan},
 )
 NO_EVENT = with_events(ALL_KINDS, [])
-RUNS = {
-    "kinds": ALL_KINDS,
-    "no event": NO_EVENT,
-    "an event": with_events(ALL_KINDS, [Event("slip", 0.5, 0.4, 0.6)]),
-    "balls": simulate(load_scene("sphere_in_cylinder", mu_static=0.2, mu_kinetic=0.15), "projection", until=0.3),
-    "mechanisms": simulate("double_pendulum", until=0.1),
+RUNS: dict[str, Callable[[], xr.Dataset]] = {
+    "kinds": lambda: ALL_KINDS,
+    "no event": lambda: NO_EVENT,
+    "an event": lambda: with_events(ALL_KINDS, [Event("slip", 0.5, 0.4, 0.6)]),
+    "balls": lambda: simulate(
+        load_scene("sphere_in_cylinder", mu_static=0.2, mu_kinetic=0.15), "projection", until=0.3
+    ),
+    "mechanisms": lambda: simulate("double_pendulum", until=0.1),
 }
+
+
+@cache
+def run(name: str) -> xr.Dataset:
+    """One of these runs, made when the first test asks for it."""
+    return RUNS[name]()
+
+
 BOTH = pytest.mark.parametrize("ending", [".npz", ".nc"])
 
 
+@pytest.mark.drill_of("balls-.npz", "balls-.nc", "mechanisms-.npz", "mechanisms-.nc")
 @BOTH
-@pytest.mark.parametrize("dataset", RUNS.values(), ids=list(RUNS))
-def test_a_run_comes_back(tmp_path: Path, dataset: xr.Dataset, ending: str) -> None:
+@pytest.mark.parametrize("name", RUNS)
+def test_a_run_comes_back(tmp_path: Path, name: str, ending: str) -> None:
     """Numbers, units, texts and truth values come back to the last bit, and the same run gives the same file."""
-    file = tmp_path / "new" / f"run{ending}"
+    dataset, file = run(name), tmp_path / "new" / f"run{ending}"
     contents = set()
     for given in (dataset, Columns.of(dataset)):
         write(given, file)
@@ -56,14 +69,15 @@ def test_a_run_comes_back(tmp_path: Path, dataset: xr.Dataset, ending: str) -> N
         contents.add(file.read_bytes())
     assert len(contents) == 1
     assert [path.name for path in file.parent.iterdir()] == [file.name]
-    for name, item in read(file).variables.items():
-        assert item.to_numpy().tobytes() == dataset[name].to_numpy().tobytes(), name
-        assert item.dtype == dataset[name].dtype
+    for variable, item in read(file).variables.items():
+        assert item.to_numpy().tobytes() == dataset[variable].to_numpy().tobytes(), variable
+        assert item.dtype == dataset[variable].dtype
 
 
+@pytest.mark.drill
 def test_others_read_the_same_from_the_file(tmp_path: Path) -> None:
     """The numbers in a file, as another reader of netCDF, or numpy, finds them there, are those of the dataset."""
-    dataset = RUNS["balls"]
+    dataset = run("balls")
     write(dataset, tmp_path / "x.nc")
     write(dataset, tmp_path / "x.npz")
     with netcdf_file(tmp_path / "x.nc", mmap=False) as file, np.load(tmp_path / "x.npz") as arrays:

@@ -137,7 +137,7 @@ def test_the_exit_code_tells_new_kinds(tmp_path: Path, command_line: Callable[..
 
 
 @pytest.mark.nightly_of("3", "7")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", [2, 3, 7])
 def test_a_sound_engine_is_not_accused(seed: int, install_engines: Install, tmp_path: Path) -> None:
     """The example engine has no surprise in random trees."""

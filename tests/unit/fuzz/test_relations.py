@@ -50,6 +50,8 @@ def _evaluated(folder: Path, tables: dict[str, Any], name: str, relation: Relati
     return evaluated
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.nightly_of("renamed", "reordered")
 @pytest.mark.drill_of("other samples", "turned", "welded")
 @pytest.mark.parametrize("name", _RELATIONS)
@@ -59,6 +61,7 @@ def test_a_sound_truth_keeps_each_relation(name: str, tmp_path: Path) -> None:
     assert (tmp_path / "scene" / name.replace(" ", "_") / "scene.toml").is_file()
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("name", ["turned", "reversed"])
 def test_another_motion_is_a_breach(name: str, tmp_path: Path) -> None:
@@ -74,6 +77,7 @@ def test_another_motion_is_a_breach(name: str, tmp_path: Path) -> None:
     assert surprise.size > 0
 
 
+@pytest.mark.nightly
 def test_a_refused_relative_is_a_breach(tmp_path: Path) -> None:
     """A changed scene that the reader refuses is told with its sentence."""
     relation = Relation(lambda tables, _: tables["bodies"][0].update(mass=-1.0), lambda *_: {})
@@ -82,6 +86,7 @@ def test_a_refused_relative_is_a_breach(tmp_path: Path) -> None:
     assert "mass" in surprise.message
 
 
+@pytest.mark.nightly
 def test_losses_are_not_reversed(tmp_path: Path) -> None:
     """A scene with friction has no reversed one."""
     tables = deepcopy(_TABLES)

@@ -60,6 +60,7 @@ def _evaluated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shrinking, "outcome_of", lambda *_: None)
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("_evaluated")
 def test_a_scene_is_shrunk_to_what_the_surprise_needs(tmp_path: Path) -> None:
     """One body, one joint with damping and a speed are left, with numbers of two digits at most."""
@@ -72,6 +73,7 @@ def test_a_scene_is_shrunk_to_what_the_surprise_needs(tmp_path: Path) -> None:
     assert smallest.kept < smallest.tries
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("_evaluated")
 def test_the_nearest_scene_that_passes_is_told_and_written(tmp_path: Path) -> None:
     """The other direction of the speed passes, in one clause, and is a scene file of its own."""
@@ -83,6 +85,7 @@ def test_the_nearest_scene_that_passes_is_told_and_written(tmp_path: Path) -> No
     assert nearest["joints"][0]["v0"] == -joint["v0"]
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("_evaluated")
 def test_a_try_with_another_failure_is_passed_on(tmp_path: Path) -> None:
     """A rejected try that fails in another way is a find of its own, not a smaller scene."""

@@ -22,6 +22,7 @@ _STARTS = re.compile(
 )
 
 
+@pytest.mark.drill
 def test_every_process_is_started_by_three_modules() -> None:
     """No module but three starts a process: a call of subprocess, of os, or of a pool."""
     folder = Path(proofroll.__file__).parent

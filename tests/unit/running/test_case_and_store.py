@@ -260,6 +260,7 @@ def test_two_writers_and_a_reader(tmp_path: Path, make_case: MakeCase) -> None:
     assert store.trajectory(case).read_text() == last.message * 1000
 
 
+@pytest.mark.drill
 def test_scraps_are_swept(tmp_path: Path, make_case: MakeCase) -> None:
     """What a killed process left is removed by the next; what another writes into, and what is not ours, stays."""
     (tmp_path / ".other").mkdir()

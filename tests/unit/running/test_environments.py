@@ -45,7 +45,7 @@ def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.own_workers
 def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: Callable[..., Any]) -> None:
     """By pip, with this proofroll; its label runs the version that was asked for, and nothing is left of it at last."""
@@ -70,6 +70,7 @@ def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: 
     assert wheels.is_dir()
 
 
+@pytest.mark.drill
 def test_a_version_that_is_too_old_is_not_installed(
     wheels: Path, install_engines: Callable[[dict[str, str]], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -84,6 +85,8 @@ def test_a_version_that_is_too_old_is_not_installed(
         make_environment.add("grown", ["numpy==1.26.4", "grown==2.5"])
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("requirements", "options", "says"),
     [

@@ -23,7 +23,7 @@ def process(worker: Worker) -> int:
     return int(worker._process.pid)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_worker_is_kept_for_its_engine() -> None:
     """The same process answers for the same engine again, and never for another."""
     workers = Workers()
@@ -38,7 +38,7 @@ def test_a_worker_is_kept_for_its_engine() -> None:
     workers.close()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_prepared_worker_serves_the_engine_and_a_wrong_name_is_left_to_who_asks_next() -> None:
     """An engine's process is kept once it has imported what a run needs; of nonsense nothing is kept or raised."""
     workers = Workers()
@@ -59,6 +59,7 @@ def test_a_worker_with_which_something_went_wrong_is_ended() -> None:
     assert worker._process.poll() is not None
 
 
+@pytest.mark.drill
 def test_idle_workers_are_bounded_and_end_with_their_owner() -> None:
     """Of many idle workers the oldest are ended, and all are when nobody holds them any more."""
     workers = Workers()

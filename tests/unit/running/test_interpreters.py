@@ -46,7 +46,7 @@ def case_in(python: Path, workers: Workers | None = None) -> Case:
     return single_case("sphere_in_cylinder", {}, f"aged@{python}", workers=workers, **SHORT)  # type: ignore[arg-type]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_engine_runs_where_its_name_says(
     old: Path, new: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -134,6 +134,8 @@ def writes(text: str) -> Callable[[Path], Path]:
     return lambda folder: script(folder / "program", text)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("too-old")
 @pytest.mark.parametrize(
     ("make", "error", "says"),
@@ -169,6 +171,7 @@ def test_what_does_not_serve_says_why(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.drill
 def test_another_proofroll_is_not_trusted(tmp_path: Path) -> None:
     """A worker of another proofroll is refused at once, by protocol, version or code."""
     mine = own()
@@ -186,7 +189,7 @@ def test_another_proofroll_is_not_trusted(tmp_path: Path) -> None:
     assert "has other code of proofroll" in str(found)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_noise_is_not_an_answer(tmp_path: Path) -> None:
     """A Python that prints when it starts serves nevertheless."""
     python = seeing(tmp_path / "venv", "1.0")
@@ -194,6 +197,7 @@ def test_noise_is_not_an_answer(tmp_path: Path) -> None:
     assert describe(f"aged@{python}").version == "1.0"
 
 
+@pytest.mark.drill
 def test_no_engine_of_another_interpreter_is_loaded_here(old: Path) -> None:
     """What runs in this process refuses a place instead of running its own version under that label."""
     with pytest.raises(InputError, match="cannot be loaded into this one"):
@@ -204,6 +208,7 @@ def test_no_engine_of_another_interpreter_is_loaded_here(old: Path) -> None:
         worker.request({"do": "describe", "engine": "aged@elsewhere"}, 60)
 
 
+@pytest.mark.drill
 def test_a_worker_names_what_it_knows(old: Path) -> None:
     """A request that a worker does not know is answered, and it goes on."""
     with Workers().lend(f"aged@{old}") as worker:

@@ -29,6 +29,7 @@ def family() -> Iterator[subprocess.Popen[str]]:
     process.communicate("\n")
 
 
+@pytest.mark.drill
 @proc
 def test_children_count(family: subprocess.Popen[str]) -> None:
     """The memory of a process is that of its children too, at any depth."""

@@ -189,6 +189,7 @@ def test_a_kill_from_outside(pretend: Pretend) -> None:
     assert str(died()) == "the engine's process was killed by SIGKILL, as by a system that runs out of memory"
 
 
+@pytest.mark.drill
 def test_all_workers_can_be_ended_at_once(pretend: Pretend) -> None:
     """From a signal handler every worker is ended, so that whoever waits for one goes on."""
     pretend("time.sleep(600)")
@@ -219,6 +220,7 @@ def test_processor_time_of_workers_counts(pretend: Pretend) -> None:
     assert processor_seconds() - before == pytest.approx(5.0 + time.process_time() - own, abs=1e-2)
 
 
+@pytest.mark.drill
 def test_a_worker_volunteers_and_reads_nothing() -> None:
     """In a real worker standard input is empty, no core is left, and the kernel ends it before its parent."""
     with Worker() as worker:
@@ -277,6 +279,7 @@ def test_who_computes_without_end_is_ended_beside_others_too(pretend: Pretend, c
     assert died(time_limit=0.3).status is Status.TIMEOUT
 
 
+@pytest.mark.drill
 def test_modules_of_the_working_folder_are_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A worker beside files named as modules of Python, of ours and of engines runs none of them."""
     for name in ("random", "numpy", "mujoco", "proofroll"):
@@ -288,6 +291,7 @@ def test_modules_of_the_working_folder_are_not_imported(tmp_path: Path, monkeypa
     assert not (tmp_path / "executed").exists()
 
 
+@pytest.mark.drill
 def test_the_time_of_a_worker_that_is_ended_counts(pretend: Pretend) -> None:
     """What a worker computed before it was ended at its limit is processor time of this process, too."""
     pretend("while True: pass")

@@ -162,6 +162,7 @@ def test_a_program_that_does_not_answer_is_asked_once(tmp_path: Path) -> None:
     assert not begun.exists() or begun.read_text().split() == ["begun"]
 
 
+@pytest.mark.nightly
 @pytest.mark.nightly_of("recommend")
 @pytest.mark.parametrize(
     "command", ["run", *(pytest.param(name, marks=pytest.mark.drill) for name in ("compare", "recommend"))]

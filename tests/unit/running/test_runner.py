@@ -86,6 +86,7 @@ def test_stored_results_are_reused(tmp_path: Path, make_case: MakeCase) -> None:
     assert fresh.reused == 0
 
 
+@pytest.mark.drill
 def test_a_fresh_runner_runs_each_case_once(tmp_path: Path) -> None:
     """Studies that share a fresh runner share its cases: what it ran itself is not run again."""
     case = single_case(
@@ -99,6 +100,7 @@ def test_a_fresh_runner_runs_each_case_once(tmp_path: Path) -> None:
     assert fresh.reused == 1
 
 
+@pytest.mark.drill
 def test_progress_is_told_of_every_case_once(tmp_path: Path, make_case: MakeCase) -> None:
     """Equal cases are run once, and progress is reported in the caller's thread, stored results included."""
     seen: list[tuple[str, Status, bool]] = []
@@ -112,6 +114,7 @@ def test_progress_is_told_of_every_case_once(tmp_path: Path, make_case: MakeCase
     assert sorted(seen) == [("oracle", Status.DONE, True), ("refuses", Status.REFUSED, True)]
 
 
+@pytest.mark.drill
 def test_a_result_asks_for_further_cases(tmp_path: Path, make_case: MakeCase) -> None:
     """Each answer may ask for more, stored or not; what was asked for before is not run again; an end comes."""
     cases = [make_case("oracle", parameters={"speed": float(speed)}) for speed in (2, 3, 4, 5)]
@@ -132,6 +135,7 @@ def test_a_result_asks_for_further_cases(tmp_path: Path, make_case: MakeCase) ->
     assert Runner(Store(tmp_path), jobs=2).follow([], then) == {}
 
 
+@pytest.mark.drill
 def test_a_case_that_makes_no_sense_costs_only_itself(tmp_path: Path, make_case: MakeCase) -> None:
     """A setting that does not exist is that case's refusal; the other cases arrive, and alone it is raised."""
     wrong, right = make_case("oracle", settings={"speed": 3}), make_case("oracle")
@@ -143,6 +147,7 @@ def test_a_case_that_makes_no_sense_costs_only_itself(tmp_path: Path, make_case:
         run_one(wrong, tmp_path / "out.npz")
 
 
+@pytest.mark.drill
 def test_an_error_in_progress_ends_the_run(tmp_path: Path, make_case: MakeCase) -> None:
     """An interruption reaches the caller although an engine hangs, and leaves no process behind."""
 
@@ -155,6 +160,7 @@ def test_an_error_in_progress_ends_the_run(tmp_path: Path, make_case: MakeCase) 
     assert not runner._busy
 
 
+@pytest.mark.drill
 def test_a_damaged_result_says_so_once(tmp_path: Path, make_case: MakeCase) -> None:
     """A result that is not what was stored is made again, its row says why, and the next run finds it sound."""
     case, store = make_case("oracle"), Store(tmp_path)
@@ -189,7 +195,7 @@ print(json.dumps([said, *kept]))
 """
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_disk_that_is_really_full(tmp_path: Path, make_case: MakeCase) -> None:
     """A full disk ends the run with one line; what fits is stored, and running all again loses nothing."""
     cases = [dataclasses.asdict(make_case("oracle", parameters={"speed": speed})) for speed in (3.0, 4.0, 5.0)]
@@ -209,6 +215,7 @@ def test_a_disk_that_is_really_full(tmp_path: Path, make_case: MakeCase) -> None
         assert "incoming" not in message
 
 
+@pytest.mark.drill
 def test_timed_runs(tmp_path: Path, make_case: MakeCase) -> None:
     """Speed is measured in runs of their own, at least one, and given per simulated second."""
     result = run_one(make_case("oracle", timed=True), tmp_path / "run.npz")
@@ -246,6 +253,7 @@ def test_manifest_of_the_truth(tmp_path: Path, make_case: MakeCase) -> None:
     assert dataset["gamma"].attrs["error_bar"] > 0
 
 
+@pytest.mark.drill
 def test_the_time_of_the_truth_has_an_account(tmp_path: Path, make_case: MakeCase) -> None:
     """The truth's time is its own; clean-up, loading and writing are what they are of any run."""
     (facts,) = resolve([("truth", {})])
@@ -285,6 +293,7 @@ def test_describe_what_cannot_be_described() -> None:
         describe("unheard_of")
 
 
+@pytest.mark.drill
 def test_resolve_gives_each_answer_in_its_place() -> None:
     """Settings of several engines come back in the order asked, each as facts or as its own error."""
     found = resolve(
@@ -311,6 +320,7 @@ def test_code_hash_follows_the_adapter(tmp_path: Path, monkeypatch: pytest.Monke
     assert hashes[0] != hashes[1]
 
 
+@pytest.mark.drill
 def test_what_an_engine_does_to_its_judge_reaches_no_other_row(tmp_path: Path, make_case: MakeCase) -> None:
     """A row whose engine changed what judges it is not believed, and its process judges no further one."""
     bent, honest = make_case("judges_itself"), make_case("oracle")

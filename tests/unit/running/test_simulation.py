@@ -205,6 +205,8 @@ def test_what_is_no_sample_and_nothing_built(method: str, given: Any, words: str
         proofroll.simulate("sphere_in_cylinder", engine, until=0.05)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("given", [7, [("bounce", 0.1)]])
 def test_what_is_no_event(given: Any) -> None:
     """Whoever tells events in another form reads which one is asked for."""

@@ -15,6 +15,7 @@ from proofroll.running.time_case import time_once
 from proofroll.studies.cases import single_case
 
 
+@pytest.mark.drill
 def test_what_is_measured_is_a_run_of_the_case(install_engines: Callable[[Mapping[str, str]], None]) -> None:
     """The cost is that of an engine that takes its time: wall seconds per simulated second, as many as it sleeps."""
     install_engines({"sleepy": "tiny:Sleepy"})
@@ -46,6 +47,7 @@ def test_a_fast_case_is_measured_as_long_as_a_slow_one(install_engines: Callable
     assert simulated > 40 * case.until
 
 
+@pytest.mark.drill
 def test_an_interrupted_worker_is_not_lent_again() -> None:
     """A worker that was left in the middle of a measurement is ended: its answer would be taken for the next one's."""
     workers = Workers()

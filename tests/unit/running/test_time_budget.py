@@ -162,6 +162,8 @@ def test_what_is_left_is_read_between_two_changes() -> None:
     assert found
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.drill), 2])
 def test_cases_beyond_the_budget_are_left_out(
     tmp_path: Path, make_case: Callable[..., Case], install_engines: Callable[[Mapping[str, str]], None], jobs: int
@@ -178,7 +180,7 @@ def test_cases_beyond_the_budget_are_left_out(
     assert {result.status for result in runner.run([quick], budget=TimeBudget(60.0)).values()} == {Status.DONE}
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_asking_the_engines_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Processor time in which workers said what engines are is part of a budget, before any case has begun."""
     clock = iter(range(1000))

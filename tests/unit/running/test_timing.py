@@ -68,6 +68,8 @@ def test_interval_encloses_the_median() -> None:
     assert 1.0 <= found.low <= found.value <= found.high <= 5.0
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 6, 9, 20])
 def test_an_interval_encloses_the_true_median_as_often_as_it_says(count: int) -> None:
     """Of many samples of a skewed distribution, so many intervals hold its median as their confidence says."""

@@ -47,6 +47,7 @@ def read_until(pipe: int, done: Callable[[bytes | None], bool], seconds: float) 
     return None
 
 
+@pytest.mark.drill
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes are POSIX")
 def test_a_worker_ends_with_its_parent(
     tmp_path: Path,
@@ -98,6 +99,7 @@ def test_whatever_a_result_rests_on_decides_its_key() -> None:
     assert missing == {}
 
 
+@pytest.mark.drill
 def test_all_of_an_engines_package_decides_its_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What lies beside the folder of somebody's adapter, in the same package, may be its method."""
     package = tmp_path / "somebodys"

@@ -67,6 +67,8 @@ BETWEEN: list[tuple[str, str, Change]] = [
 ]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("scene", HONEST)
 def test_an_honest_run_agrees(scene: str) -> None:
     """An honest engine is right between its samples, too."""
@@ -75,6 +77,8 @@ def test_an_honest_run_agrees(scene: str) -> None:
     assert found.agrees, found
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("scene", "name", "change"), BETWEEN, ids=[f"{scene}-{name}" for scene, name, _ in BETWEEN])
 def test_what_is_wrong_between_the_samples_differs(scene: str, name: str, change: Change) -> None:
     """A place or a force that is right at every sample, and wrong between them, is no agreement."""
@@ -92,6 +96,8 @@ STATES: dict[str, Change] = {
 }
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", STATES)
 def test_states_of_mechanisms_are_judged(name: str) -> None:
     """7 m, 7 m/s or 7 rad/s too much in every sample but the first is no agreement, at right tracked points or not."""
@@ -104,6 +110,7 @@ def test_states_of_mechanisms_are_judged(name: str) -> None:
     assert [item.judgement.observable for item in found.compared if not item.agrees] == [name]
 
 
+@pytest.mark.drill
 def test_a_first_look_judges_the_orientation_that_a_scene_asks_for() -> None:
     """Quaternions of a ball that are frozen between samples agree nowhere, and are judged where they were asked for."""
     scene = load_scene("sphere_in_cylinder", asks=("orientation",))
@@ -119,6 +126,7 @@ COMPARISONS = sorted((Path(__file__).parents[3] / "comparisons").rglob("*.toml")
 JUDGES_PLACES = [path for path in COMPARISONS if '\npositions = "' in path.read_text(encoding="utf-8")]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("path", JUDGES_PLACES, ids=lambda path: path.stem)
 def test_every_claim_about_places_is_one_about_the_state(path: Path) -> None:
     """Whoever says in a comparison of this project how far places may be off says it of velocities and spins too.

@@ -27,6 +27,7 @@ def reference(scene: Scene) -> Reference:
     return Reference(scene, dataset, observe(scene, dataset), scales(scene, dataset))
 
 
+@pytest.mark.nightly
 def test_an_event_at_the_end_may_be_a_moment_later() -> None:
     """A run and a truth of which one has an event within its bracket of the end are judged alike; others count."""
     scene = load_scene("bouncing_ball", height=0.1, restitution=0.5, tangential_restitution=0.0)
@@ -50,6 +51,7 @@ def test_an_event_at_the_end_may_be_a_moment_later() -> None:
     assert alike(0.1 * falls, (falls, 0.0, 2 * falls)) is None  # no bracket excuses what lies two samples before
 
 
+@pytest.mark.drill
 def test_without_lift_off_nothing_changes() -> None:
     """Where the truth's ball stays on the wall, nothing is cut."""
     scene = load_scene("sphere_in_cylinder")

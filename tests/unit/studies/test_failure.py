@@ -159,6 +159,8 @@ def test_the_natural_time() -> None:
     assert SCENE.elements[0].natural_time == pytest.approx(2 * math.pi / (math.sqrt(2 / 7) * 20.0))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("after", "failure"), [(1.0, None), (-0.002, None), (-0.2, "reversed")])
 def test_resistance_does_not_drive_a_ball_back(after: float, failure: str | None) -> None:
     """A ball that resistance drives back has been reversed; the little that a step goes too far is none."""
@@ -169,6 +171,7 @@ def test_resistance_does_not_drive_a_ball_back(after: float, failure: str | None
     assert (outcome.failure, outcome.stable, outcome.silent) == (failure, failure is None, failure is not None)
 
 
+@pytest.mark.drill
 def test_a_path_of_several_components() -> None:
     """Where many components decide, each sample has one error, the largest, in parts of the widest range of one."""
     scene = load_scene("pendulum")

@@ -34,6 +34,8 @@ def test_every_file_is_sound() -> None:
         assert "SystemExit(10 if" in item.program
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("program", "state"),
     [
@@ -51,6 +53,7 @@ def test_exit_codes_are_read(program: str, state: FindingState) -> None:
     assert row.version
 
 
+@pytest.mark.drill
 def test_what_cannot_be_run_is_said() -> None:
     """An engine that is not installed is no verdict; an interpreter that does not exist is named; a hang is ended."""
     (row,) = run_findings([made("", "no-such-engine")])
@@ -68,6 +71,7 @@ time.sleep({seconds})
 """
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("seconds", [0, 300])
 def test_a_program_ends_with_what_it_started(tmp_path: Path, seconds: int) -> None:
     """A helper that holds the output of a program is not waited for, and ends with it, also at the limit of time."""
@@ -81,6 +85,7 @@ def test_a_program_ends_with_what_it_started(tmp_path: Path, seconds: int) -> No
     assert not alive
 
 
+@pytest.mark.drill
 def test_modules_of_the_working_folder_are_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Files named as modules of Python that lie where the command is called are not run."""
     for name in ("json", "random"):

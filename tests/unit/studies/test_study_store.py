@@ -72,6 +72,8 @@ def test_an_axis_to_infinity_comes_back(tmp_path: Path) -> None:
     assert valid_study(tmp_path / "study.json", StabilityStudy) == (study, [])
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("values", "words"),
     [
@@ -133,6 +135,7 @@ def test_engines_are_among_the_versions() -> None:
     assert {"proofroll", "mujoco", "exudyn", "pin", "numpy", "scipy"} <= study_store.versions().keys()
 
 
+@pytest.mark.drill
 def test_an_environment_that_was_made_anew_is_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same label with other packages outdates a study; a further label, or one that is gone, does not."""
     monkeypatch.setenv(VARIABLE, str(tmp_path))
@@ -168,6 +171,7 @@ def test_each_change_is_told() -> None:
         assert words in text
 
 
+@pytest.mark.drill
 def test_code_of_a_plug_in_is_among_the_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A study does not outlive the code of an engine's package, edited without a new version; nothing imports it."""
     package = tmp_path / "edited_engine"

@@ -55,7 +55,7 @@ def test_a_step_that_does_not_divide_the_asked_sampling_is_refused(command_line:
     assert 0.0025 / float(advised) == pytest.approx(3)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_copies_cost_and_err_as_single_runs(rows: Callable[..., list[dict[str, Any]]]) -> None:
     """Copies of a batch have the error of single runs, at the same value; twins are equal and no number is lost."""
     single, one, many = rows("1,7", "mujoco[integrator=Euler]", "batched[integrator=Euler]")
@@ -79,7 +79,7 @@ def test_a_copy_that_reads_its_neighbour_shows(rows: Callable[..., list[dict[str
     assert 1e-5 < row["twins_apart"] < 1e-2
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_table_and_a_picture_name_the_device(
     command_line: Proofroll, install_engines: Callable[[Mapping[str, str]], None], tmp_path: Path
 ) -> None:

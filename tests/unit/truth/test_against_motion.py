@@ -60,6 +60,7 @@ def bar(true: Any) -> float:
     return max(float(true[name].attrs["error_bar"]) for name in ("p_WB", "w_WB"))
 
 
+@pytest.mark.drill
 def test_a_backspin_keeps_its_moment_as_long_as_the_centre_goes_on() -> None:
     """The moment is against the motion ahead, so that f N adds to μ N a until the centre has turned back."""
     speed, spin, time = 1.0, -100.0, 0.3
@@ -69,6 +70,7 @@ def test_a_backspin_keeps_its_moment_as_long_as_the_centre_goes_on() -> None:
     assert last(true) == pytest.approx(expected, abs=1e-11)
 
 
+@pytest.mark.drill
 def test_the_moment_reverses_with_the_centre() -> None:
     """A back spin that outlasts the motion brings the ball back, and the moment turns round as its centre does."""
     speed, spin, time = 0.4, -150.0, 0.5
@@ -81,6 +83,8 @@ def test_the_moment_reverses_with_the_centre() -> None:
     assert [event.kind for event in events_of(true)] == []
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("first", [True, False])
 def test_the_order_of_the_pair_does_not_matter(first: bool) -> None:
     """A ball that slips askew moves alike whichever body the pair names first, and not as against its turning."""
@@ -92,6 +96,7 @@ def test_the_order_of_the_pair_does_not_matter(first: bool) -> None:
     assert turning["p_WB"].to_numpy()[-1, 0, :2] == pytest.approx([0.411600987501, 0.179208167138], abs=1e-9)
 
 
+@pytest.mark.drill
 def test_rolling_is_the_same_by_both_laws() -> None:
     """A ball that rolls to rest has one motion, to the truth's bar, for there the centre moves as the ball turns."""
     start: Any = {"speed": (0.3, 0.2, 0.0), "spin": (-0.2 / RADIUS, 0.3 / RADIUS, 0.0)}
@@ -100,6 +105,7 @@ def test_rolling_is_the_same_by_both_laws() -> None:
     assert float(np.abs(true["v_WB"][-1]).max()) <= 1e-15
 
 
+@pytest.mark.drill
 def test_a_ball_that_starts_spinning_in_place_resists_the_motion_that_begins() -> None:
     """Its centre is driven by friction at once, and the moment is against that direction."""
     spin, time = 60.0, 0.15
@@ -110,6 +116,7 @@ def test_a_ball_that_starts_spinning_in_place_resists_the_motion_that_begins() -
     assert bar(true) < 1e-10
 
 
+@pytest.mark.drill
 def test_a_centre_that_nothing_moves_has_no_moment() -> None:
     """Without friction a ball spins in place for ever: its centre has no direction, and the normal force no shift."""
     true = found(ball(spin=(0.0, 30.0, 0.0), friction=0.0), 1.0)
@@ -117,6 +124,7 @@ def test_a_centre_that_nothing_moves_has_no_moment() -> None:
     assert last(true) == pytest.approx((0.0, 30.0), abs=1e-12)
 
 
+@pytest.mark.nightly
 def test_a_resistance_longer_than_the_arm_of_friction_turns_a_sliding_ball_back() -> None:
     """From rest on a slope with f > μ a the ball slides, and the moment exceeds that of friction."""
     slope, f, time = 0.3, 6e-3, 0.5
@@ -132,6 +140,7 @@ def test_rest_holds_what_either_law_holds() -> None:
     assert last(found(ball(f=6e-3, slope=0.1), 1.0)) == pytest.approx((0.0, 0.0), abs=1e-12)
 
 
+@pytest.mark.drill
 def test_a_slip_that_begins_while_resistance_holds_the_ball_is_refused() -> None:
     """A growing push that moves a ball held by f > μ a has no direction of motion yet: the truth ends there."""
     mechanism = replace(ball(f=6e-3), forces=(Force("push", "ball", "force", value=(Formula("2*t"), 0.0, 0.0)),))
@@ -150,6 +159,7 @@ def test_only_a_ball_on_a_wall_has_a_motion_to_resist() -> None:
         replace(parts.pairs[0], against="rolling")
 
 
+@pytest.mark.drill
 def test_a_turntable_resists_the_motion_that_it_sees() -> None:
     """A ball that slips on a plane that turns loses energy by its motion relative to the plane; both routes agree."""
     joint = Joint("turn", "revolute", "world", "table", axis=(0.0, 0.0, 1.0), motion=Formula("3*t"))
@@ -169,6 +179,8 @@ def test_a_turntable_resists_the_motion_that_it_sees() -> None:
     assert float(np.abs(true["w_WB"][-1, 0] - still["w_WB"][-1, 0]).max()) > 1e-2
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("kind", [pytest.param("bowl", marks=pytest.mark.drill), "bore"])
 def test_curved_walls_take_the_direction_along_the_wall(kind: str) -> None:
     """On a curved wall both routes agree with each other and with the laws while the ball slips."""

@@ -41,6 +41,8 @@ CASES = [
 CLOSED = [case for case in FROZEN if case["scene"] in FORMS and FORMS[case["scene"]][1](case["parameters"])]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("sphere_in_cylinder rolling_resistance")
 @pytest.mark.parametrize("case", CASES)
 def test_a_ball_read_as_a_body_moves_as_its_frozen_values_say(case: dict[str, Any]) -> None:

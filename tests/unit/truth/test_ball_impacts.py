@@ -46,7 +46,7 @@ def test_infinitely_many_bounces(e: float, height: float) -> None:
     assert settles.time_low <= rests <= settles.time_high
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.arithmetic
 def test_an_impact_at_the_end_is_not_among_the_events() -> None:
     """An impact at the last sample, to the last digit, is left out by any arithmetic; one clearly before is told."""
@@ -57,7 +57,7 @@ def test_an_impact_at_the_end_is_not_among_the_events() -> None:
 
 
 @pytest.mark.nightly_of("0.5-2.4-0.985-0.1-0.0")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("e", "height", "tilt", "radius", "speed"), [(0.5, 2.4, 0.985, 0.1, 0.0), (0.6, 0.451, -0.28, 0.068, -0.714)]
 )
@@ -72,6 +72,7 @@ def test_the_bracket_of_the_time_of_rest_holds_it(
     assert found.time_high - found.time_low < 1e-7 * rests
 
 
+@pytest.mark.drill
 def test_a_ball_that_does_not_bounce_leaves_its_only_impact_as_one_that_does() -> None:
     """With e = 0 the contact point goes on with -e_t u, slips, and is braked."""
     scene = load_scene(
@@ -126,7 +127,7 @@ def test_one_impact(e: float, e_t: float, k: float, mu: float, speed: float, rim
     assert float(found["omega3"][1]) * A == pytest.approx(rim + change / k, abs=1e-10)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_superball_loses_nothing() -> None:
     """With e = e_t = 1 no impact changes the energy, and thrown under a table the ball comes back (Garwin 1969)."""
     scene = load_scene("bouncing_ball", speed=2, back_spin=90, restitution=1, tangential_restitution=1)
@@ -136,6 +137,7 @@ def test_superball_loses_nothing() -> None:
     assert len(rates) == 2  # the spin and the speed come back at every second impact
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("e", [0.0, 0.6])
 def test_landing_in_a_lying_cylinder(e: float, tmp_path: Path) -> None:
@@ -159,7 +161,7 @@ def test_coefficients_have_bounds() -> None:
             load_scene("bouncing_ball", **{name: 1.1})
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_start_in_the_air_beside_a_curved_wall(tmp_path: Path) -> None:
     """A ball in the air with a spin of its own does not leave the wall: its bounces are told, by both routes alike."""
     air = {

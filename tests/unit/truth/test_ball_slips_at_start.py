@@ -22,7 +22,7 @@ G, A = 9.81, 0.025
 SPEEDS = st.floats(-3, 3)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @settings(max_examples=12, deadline=None)
 @given(v=st.tuples(SPEEDS, SPEEDS), rims=st.tuples(SPEEDS, SPEEDS), k=st.floats(0.1, 1), mu=st.floats(0.05, 1))
 def test_closed_form(v: tuple[float, float], rims: tuple[float, float], k: float, mu: float) -> None:
@@ -59,6 +59,7 @@ def test_closed_form(v: tuple[float, float], rims: tuple[float, float], k: float
     np.testing.assert_allclose([found["omega2"][-1], found["omega3"][-1]], across, rtol=0, atol=1e-9)
 
 
+@pytest.mark.drill
 def test_textbook() -> None:
     """Thrown without spin, a homogeneous ball rolls after 2 V0/(7 μ g) and 12 V0²/(49 μ g), with 5/7 V0."""
     v0, mu = 2.0, 0.2

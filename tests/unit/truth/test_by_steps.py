@@ -108,6 +108,7 @@ def test_the_first_exact_claim_is_the_reference() -> None:
     assert not needs_steps(hopper(held=False))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("rungs", "words", "whole"), [(2, "dt 1e-3, 5e-4 s", True), (1, "dt 1e-3, 5e-4 s", False)])
 def test_a_limit_keeps_the_runs_that_it_has(

@@ -11,6 +11,8 @@ from proofroll.elements.mechanism.reading.assembly import check_start
 from proofroll.truth.smooth.smooth_truth import find_truth
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.drill_of("massless pulley")
 @pytest.mark.parametrize("mechanism", [one_rope(), massless_pulley()], ids=["one rope", "massless pulley"])
 def test_weights_on_pulleys_fall_as_a_textbook_says(mechanism: Mechanism) -> None:

@@ -42,7 +42,7 @@ def driven_pair(motion: str, speed: float = 0.0) -> Mechanism:
     return Mechanism(bodies, joints, couplings=(coupling,), gravity=(0.0, 0.0, 0.0))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_slider_passes_its_dead_centre() -> None:
     """Crank and slider go on behind the dead centre as their one equation says; friction reverses there."""
     found = truth_of(piston(), np.array([0.0, 0.4]))
@@ -64,6 +64,8 @@ def test_a_driven_crank_carries_its_slider_through_both_senses() -> None:
     assert friction.tolist() == [2.0, 2.0, 2.0, -2.0, -2.0]
 
 
+@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.nightly_of("sine")
 @pytest.mark.parametrize(
     ("motion", "speed", "acceleration", "turns"),
@@ -87,7 +89,7 @@ def test_what_a_motion_moves_rubs_against_its_rate(
     assert [event.time for event in found.events] == pytest.approx(turns, abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_driven_foot_rubs_on_the_floor_in_both_senses() -> None:
     """A motion alone moves the foot along the floor, and friction of its weight acts against it."""
     bodies = (Body("cart", 1.0, inertia=(0.1, 0.1, 0.1)), Body("block", 2.0, inertia=(0.1, 0.1, 0.1)))
@@ -112,6 +114,8 @@ def test_what_stands_because_it_is_driven_has_no_determinate_friction() -> None:
         truth_of(driven_pair("0.3 + 0*t"), np.array([0.0, 0.1]))
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("motion", [pytest.param("0.7853981633974483 + 10*t", marks=pytest.mark.drill), ""])
 def test_projection_passes_dead_centres(motion: str) -> None:
     """Its slider passes the dead centre with the truth's values."""

@@ -47,7 +47,7 @@ def test_one_effort_at_its_limit_all_the_time_is_clamped_beside_another_that_nev
     assert found.events == ()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_true_rotor_turns_with_the_rod_that_carries_it() -> None:
     """A rotor behind a gear n adds I [[1, n], [n, n^2]] to the mass matrix, and its mass; armature is n^2 I alone."""
     inertia, n, mass, g = 1e-4, 50.0, 0.1, 9.81
@@ -69,6 +69,7 @@ def test_a_true_rotor_turns_with_the_rod_that_carries_it() -> None:
     assert truth.bars["q"][-1] < 1e-10
 
 
+@pytest.mark.drill
 def test_a_stiff_damper_lets_the_mass_go_its_time_constant() -> None:
     """A mass in a damper goes (F/c) t + (v0 - F/c) (m/c) (1 - exp(-c t/m)), and then as fast as its force."""
     t = np.array([0.0, 0.001, 0.2])
@@ -77,6 +78,7 @@ def test_a_stiff_damper_lets_the_mass_go_its_time_constant() -> None:
     assert found.bars["q"][-1] < TIGHT
 
 
+@pytest.mark.drill
 def test_friction_that_holds_a_weight_is_the_weight() -> None:
     """A mass that its friction can hold does not move, and friction tells the weight; a weaker one lets it fall."""
     found = true_motion("friction_hold", [0.0, 0.5, 1.0])
@@ -109,6 +111,7 @@ def test_breaks_of_a_table_cost_no_digits() -> None:
     assert found.bars["q"][-1] < TIGHT
 
 
+@pytest.mark.drill
 def test_a_coupled_joint_that_sticks_holds_the_other() -> None:
     """A wheel driven through a gear stays as long as the reflected friction of the other one is stronger."""
     wheels = (Body("a", 1.0, inertia=ONES), Body("b", 1.0, inertia=ONES))
@@ -158,6 +161,8 @@ def by_itself(mass: float, law: Actuator, spring: float, target: Formula, until:
     return float(y[0]), times
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.drill) for seed in range(1, 4))])
 def test_servos_with_limits_agree_with_another_solver(seed: int) -> None:
     """With random numbers and a target of time, place and switches are those of a plain solver with events."""

@@ -27,7 +27,7 @@ def slider(law="", at=0.0, v0=1.0, mass=1.0, **more):
 
 
 @pytest.mark.nightly_of("False")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("compiled", [True, pytest.param(False, marks=pytest.mark.drill)])
 def test_a_spring_with_two_stiffnesses_swings_through_its_kink(compiled, monkeypatch):
     """K = 4 N/m for pull and 1 N/m for push: half swings of pi/2 s and pi s, whatever integrates them."""
@@ -50,6 +50,8 @@ def test_laws_with_one_meaning_give_one_motion():
     assert places == pytest.approx([places[0]] * 4, abs=1e-13)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("at", "v0"), [(0.0, 0.0), (0.0, 1e-8), (1e-13, -1.0), (-1e-13, 1.0)])
 def test_a_start_at_a_kink_takes_the_side_of_its_motion(at, v0):
     """At rest on the kink the load decides, at a speed the speed, whatever the last digits of the place are."""
@@ -61,6 +63,7 @@ def test_a_start_at_a_kink_takes_the_side_of_its_motion(at, v0):
     assert found.record.q[-1, 0] == pytest.approx(true, abs=1e-12)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.daily("force-max(0, sin(3*t))", "torque-abs(cos(3*t))", "target-sign(sin(3*t))", "force-min(t, 1 - t)")
 @pytest.mark.parametrize("text", ["max(0, sin(3*t))", "abs(cos(3*t))", "sign(sin(3*t))", "min(t, 1 - t)"])
 @pytest.mark.drill
@@ -82,6 +85,7 @@ def test_kinks_of_drives_are_located(text, part):
     assert found.record.v[-1, 0] == pytest.approx(true, abs=1e-12)
 
 
+@pytest.mark.nightly
 def test_a_motion_with_a_kink_in_its_acceleration_is_followed():
     """A slide that is moved by max(0, t - 0.5)^3 begins without a jolt; its drive is mass times acceleration."""
     found = truth_of(
@@ -91,6 +95,7 @@ def test_a_motion_with_a_kink_in_its_acceleration_is_followed():
     assert found.record.named[:, 0] == pytest.approx([0, 0, 6.0], abs=1e-11)
 
 
+@pytest.mark.drill
 def test_a_motion_whose_speed_jumps_ends_the_truth():
     """No finite force moves a slide by abs(t - 0.5): the truth ends there, with what is before."""
     found = truth_of(slider(v0=-1.0, at=0.5, joint={"motion": Formula("abs(t - 0.5)")}), np.array([0.0, 0.4, 1.0]))
@@ -99,6 +104,7 @@ def test_a_motion_whose_speed_jumps_ends_the_truth():
     assert found.record.time.tolist() == [0.0, 0.4]
 
 
+@pytest.mark.drill
 def test_a_law_that_would_hold_ends_the_truth():
     """A damper of constant force sticks at rest, which no formula says: the truth ends there, with the reason."""
     found = truth_of(slider("2*sign(dL)", v0=1.0), np.array([0.0, 0.4, 1.0]))
@@ -137,6 +143,7 @@ def test_unknown_functions_are_refused_with_the_known_ones():
         SpringLaw("sinh(L)")
 
 
+@pytest.mark.nightly
 def test_a_prescribed_motion_starts_on_the_side_to_which_time_goes():
     """From a kink at time 0 a motion |sin 3t| has the rate 3, up to the next kink, at which the truth ends."""
     joint = Joint("x", "prismatic", "world", "m", axis=(1, 0, 0), motion=Formula("0.1*abs(sin(3*t))"))

@@ -50,6 +50,7 @@ def as_given(scene: str, until: float) -> TwoRouteMotion:
 DEAR = (("flick", 0.15), ("spinning_bounce", 0.4), ("sled", 0.65), ("spring_friction", 2.0))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("sled-0.65-scale7", "spring_friction-2.0-scale8")
 # Under other kinds of arithmetic the dear ones are made smaller and heavier alone.
 @pytest.mark.drill
@@ -213,6 +214,7 @@ def test_loops_and_shapes_have_lengths_too() -> None:
     assert own.joints[1].limits is None
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("turn", np.linspace(0.0, 0.4, 9))
 def test_a_small_mechanism_far_from_the_origin_closes(turn: float) -> None:
     """Loops of 0.1 mm that close 10 m from the world's origin are accepted: round-off of such places is larger."""
@@ -250,6 +252,8 @@ def test_a_mechanism_at_one_place_has_a_length_that_follows_it(scene: str, point
     assert other.length == pytest.approx(100.0 * one.length)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("height", [1e-3, 1e-12])
 def test_a_point_at_rest_falls_on_its_stop_from_any_height(height: float) -> None:

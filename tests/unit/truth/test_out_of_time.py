@@ -29,6 +29,7 @@ def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("proofroll.core.pace.time.process_time", lambda: next(ticks) / 100)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("stopped_fall-parameters1")
 @pytest.mark.drill
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ BARS = 1e-10  # s, and units of values: 1e-12 is seen
 ROOTS = np.array([-14.0783896927982, -0.3228664296, -0.7753418818 - 4.4648677130j, -0.7753418818 + 4.4648677130j])
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("bricard", "babyboot", "pushed_box", "andrews_squeezer")
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=MARKS[name in NIGHTLY]) for name in tables()]
@@ -38,6 +39,8 @@ MOTIONS = {entry["scene"] + str(entry.get("parameters", "")): entry for entry in
 LONG = {"sled", "sled_on_slope", "eccentric_sphere", "tilted_disc", "rattleback"}
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of("rattleback")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.drill) if name in LONG else name for name in MOTIONS]
@@ -61,7 +64,7 @@ def test_a_bicycle_leans_as_published() -> None:
     assert rolls == pytest.approx([0.1056094344262, -0.0412938697178, 0.0561808086960], abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_small_motions_of_a_bicycle_have_the_published_roots() -> None:
     """At 5 m/s a lean of 1e-4 rad/s is a sum of the four published exponentials."""
     times = np.linspace(0.0, 1.0, 41)
@@ -109,7 +112,7 @@ def ring_rates(_: float, state: Any) -> list[float]:
     return [p * speed, q * speed, -(slopes[1] + slopes[0] * speed**2 / 2) / inertia]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_ring_of_six_rods_follows_one_coordinate() -> None:
     """Problem A04 to 10 s: published places of the ring are those of its closed form in one coordinate."""
     (entry,) = tables()["bricard"]

@@ -30,7 +30,7 @@ def shaken(motion: Signal) -> Mechanism:
 
 
 @pytest.mark.nightly_of("True")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("table", [pytest.param(False, marks=pytest.mark.drill), True])
 def test_a_shaken_pendulum_is_that_of_its_equation(table: bool) -> None:
     """Angle, place of the base and force of the drive are those of the pendulum's equation by another solver."""
@@ -114,7 +114,7 @@ def four_bar_moment(times: Array) -> Array:
     return moment
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_inverse_dynamics_through_a_loop_is_virtual_power() -> None:
     """The moment that drives a closed linkage is what links take, each by its own acceleration, over the speed."""
     times = np.array([0.0, 0.07, 0.31, 0.5])
@@ -135,6 +135,7 @@ def on_a_moved_plate(kind: str, axis: tuple[float, float, float], motion: str) -
     return Mechanism(bodies, joints, geometries=shapes, pairs=(Pair("p", ("skin", "floor"), friction=0.4),))
 
 
+@pytest.mark.drill
 def test_a_ball_follows_a_plate_that_shakes_until_it_would_pull() -> None:
     """A ball on a plate at A (1 − cos ωt) presses with m (g + A ω² cos ωt), and leaves where that is zero."""
     size, pace = 0.02, 30.0
@@ -184,7 +185,7 @@ def test_friction_and_stops_beside_a_motion_switch_alike() -> None:
 
 
 @pytest.mark.nightly_of("3.0")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("angle", [0.3, pytest.param(3.0, marks=pytest.mark.drill)])
 def test_a_motion_that_leaves_nothing_free_holds_its_laws(angle: float) -> None:
     """Where all is prescribed no state bounds the steps, and yet each law is held over the whole turn."""

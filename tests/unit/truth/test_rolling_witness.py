@@ -47,6 +47,7 @@ def witnessed(scene: Scene, element: MechanismElement) -> xr.Dataset:
     return run_of(Scene(element.name, "", (element,)), TIMES, *motion, force=record.wrench[:, contact, :3])
 
 
+@pytest.mark.drill
 def test_truth_of_a_ball_agrees_with_rolling_rows() -> None:
     """Motion and forces of a rolling ball lie within the error bars that two other routes gave them."""
     pytest.importorskip("heyoka")

@@ -35,6 +35,8 @@ AGREED = {
 }
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", AGREED)
 def test_tracked_point_is_where_independent_programs_agree(scene, name):
     """Taylor series in maximal coordinates reach the agreed digits."""
@@ -69,6 +71,8 @@ SHORT = {
 }
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("bricard", "chain")
 @pytest.mark.parametrize("name", SHORT)
 def test_both_routes_agree(scene, name):
@@ -87,6 +91,7 @@ def test_both_routes_agree(scene, name):
     assert np.abs(energy - placed(mechanism, two).energy()).max() < 1e-11 * max(1.0, np.abs(energy).max())
 
 
+@pytest.mark.drill
 def test_maximal_coordinates_without_taylor_series(scene):
     """DOP853 with projection of the same rows gives the same motion, redundant rows included."""
     mechanism = scene("bricard")
@@ -97,6 +102,7 @@ def test_maximal_coordinates_without_taylor_series(scene):
     assert two.residual.max() < 1e-13
 
 
+@pytest.mark.drill
 def test_routes_agree_on_every_kind_of_joint():
     """A tree with planar, universal, prismatic, spherical, free and fixed joints moves alike by both routes."""
     mechanism = replace(mechanism_examples.every_kind(), loops=())
@@ -108,6 +114,7 @@ def test_routes_agree_on_every_kind_of_joint():
     assert np.abs(one.v - two.v).max() < 1e-11
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "cylindrical", "universal", "spherical", "planar", "fixed"])
 def test_routes_agree_on_every_kind_of_loop(kind):
     """A loop of each kind between two branches in space, reactions included; the root is free, so nothing hides."""
@@ -196,6 +203,7 @@ def turned_joints(draw, kind, name, parent, along=None):
                  **options)  # fmt: skip
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("kind", "in_plane"), [*((kind, False) for kind in FACTS), ("revolute", True), ("planar", True)]
 )
@@ -221,6 +229,7 @@ def test_both_routes_start_where_a_joints_definition_says(kind, in_plane, data):
         assert max(np.abs(record.v_WB[0] - rates).max(), np.abs(record.w_WB[0] - spins).max()) < 1e-8
 
 
+@pytest.mark.drill
 def test_springs_and_dampers_along_joints_act_alike():
     """Springs, dampers and drives along all kinds of coordinates that may have them, in both routes."""
     body = {"mass": 1.0, "com": (0.1, 0.2, -0.3), "inertia": (0.1, 0.2, 0.25)}
@@ -241,6 +250,7 @@ def test_springs_and_dampers_along_joints_act_alike():
     assert energy[1] < energy[0]
 
 
+@pytest.mark.drill
 def test_energy_counts_the_springs_of_universal_joints():
     """What moves without a damper keeps its energy, that of both springs of a universal joint included."""
     body = Body("a", 1.0, (0.1, 0.2, -0.3), (0.1, 0.2, 0.25))
@@ -260,6 +270,7 @@ def test_series_are_in_long_doubles(scene):
     assert 0 < np.abs(states - states.astype(float)).max() < 1e-14
 
 
+@pytest.mark.drill
 def test_steps_of_many_bodies_do_not_chase_round_off(scene, monkeypatch):
     """Twenty links take some thousand evaluations, though the tolerance lies below the noise of their accelerations."""
     evaluations = count(1)

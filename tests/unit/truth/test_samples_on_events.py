@@ -22,6 +22,8 @@ def dropped(restitution: float) -> Mechanism:
     return Mechanism((ball,), (joint,), geometries=shapes, pairs=pairs, gravity=tuple((10 * DOWN).tolist()))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("last_digits", [-3, -1, 0, 1, 3])
 def test_a_sample_on_an_impact_has_the_velocity_after_it(last_digits: int) -> None:
     """A ball that rebounds by half on a turned floor is known as well there as anywhere else."""
@@ -33,6 +35,8 @@ def test_a_sample_on_an_impact_has_the_velocity_after_it(last_digits: int) -> No
     assert found.bars["v_WB"][-1] < 1e-12
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "last_digits", [0, pytest.param(-1, marks=pytest.mark.drill), pytest.param(1, marks=pytest.mark.drill)]
 )

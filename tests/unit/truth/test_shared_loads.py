@@ -31,7 +31,7 @@ def _skid_steered() -> Mechanism:
     )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_forces_of_joints_and_drives_that_hang_on_a_split_are_not_given() -> None:
     """Four wheels share the load: axles, drives and their work have no values, the free joint has, bars stay small."""
     found = truth_of(_skid_steered(), np.array([0.0, 0.01]))
@@ -44,7 +44,7 @@ def test_forces_of_joints_and_drives_that_hang_on_a_split_are_not_given() -> Non
     assert max(float(found.bars[name][-1]) for name in ("wrench", "named", "work", "p_WB", "v_WB")) < 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_light_body_on_a_heavy_one_slides_until_both_move_alike() -> None:
     """A box of 2 kg on a belt of 1e6 kg sticks where momentum says, as on a light belt."""
     belt, box, speed, mu, g = 1e6, 2.0, 0.8, 0.3, 9.81
@@ -68,6 +68,8 @@ def test_a_light_body_on_a_heavy_one_slides_until_both_move_alike() -> None:
     assert found.record.p_WB[1, 1, 0] == pytest.approx(mu * g * sticks**2 / 2 + common * (0.4 - sticks), abs=1e-9)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("lean", "bend", "holds"),
     [(0.02, 1.8, (0.52, 2.85)), pytest.param(0.5, -0.88, (1.51, 2.94), marks=pytest.mark.drill)],
@@ -93,6 +95,7 @@ def test_a_leg_that_rubs_in_its_joints_rests_on_its_tip(lean: float, bend: float
     assert np.isnan(found.record.named).all()
 
 
+@pytest.mark.drill
 @pytest.mark.nightly_of("100000000.0")
 @pytest.mark.parametrize("ratio", [1e6, pytest.param(1e8, marks=pytest.mark.drill)])
 def test_a_box_rests_on_one_that_is_far_lighter(ratio: float) -> None:

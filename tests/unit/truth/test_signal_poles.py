@@ -62,6 +62,8 @@ def test_nothing_before_a_pole_is_refused_by_name() -> None:
         truth_of(pushed("1/(1e-5 - t)"), np.linspace(0.1, 1, 10))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.filterwarnings("ignore:invalid value")  # of routes beyond the end
 @pytest.mark.parametrize(("law", "end"), [("3*sqrt(1.2 - L)", 1.2), ("log(L - 0.9)", 0.9), ("0.1*(L - 1)", 0.0)])
 def test_an_end_names_the_spring_whose_formula_ends_there(law: str, end: float) -> None:

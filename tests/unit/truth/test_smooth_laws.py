@@ -25,6 +25,8 @@ def published(mechanism, times=TIMES):
     return MechanismTruth.truth(MechanismElement(mechanism), times, ())
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["pendulum", "gear_pair", pytest.param("slider_crank", marks=pytest.mark.drill)])
 def test_an_honest_truth_holds_the_laws(scene, name):
     """Joints, couplings, loops and motion hold at all samples, to the last time."""
@@ -33,6 +35,7 @@ def test_an_honest_truth_holds_the_laws(scene, name):
     assert "ended" not in found.attrs
 
 
+@pytest.mark.drill
 def test_a_wrong_load_of_one_route_changes_its_energy(scene, monkeypatch):
     """Gravity that is wrong by a millionth in joint coordinates ends the truth, and the route is named."""
     for module in (maximal_taylor, contact_taylor):
@@ -64,6 +67,7 @@ def test_turns_of_a_fast_wheel_are_counted_in_each_route(scene):
     assert found.attrs["laws"].endswith("laws at 3 of 3 samples")
 
 
+@pytest.mark.drill
 def test_a_body_at_rest_beside_one_that_swings_holds_the_laws():
     """What round-off alone moves has no series that its points resolve; the laws hold of it as of the other body."""
     joints = tuple(

@@ -94,6 +94,8 @@ def top(kind: Any) -> Geometry:
     return Geometry("solid", "world", kind, position=turned((0, 0, -0.5)), **TOP[kind])  # type: ignore[arg-type]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("0.0-cylinder", "inf-box")
 @pytest.mark.parametrize("kind", TOP)
 @pytest.mark.parametrize("friction", [0.0, np.inf])
@@ -126,6 +128,8 @@ def test_a_ball_on_a_face_moves_as_on_a_plane() -> None:
         np.testing.assert_allclose(getattr(box, name), getattr(flat, name), rtol=0, atol=1e-13)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("aside", [(0.06, 0.0), (0.05, 0.07)])
 def test_a_ball_that_drops_on_an_edge_or_corner_rebounds_along_the_line_to_it(aside: tuple[float, float]) -> None:
     """Its centre aside of an edge, or of a corner, sets the normal of the impact: v' = v - (1 + e)(v·n)n."""
@@ -195,6 +199,7 @@ def test_a_capsule_without_length_is_a_ball() -> None:
     np.testing.assert_allclose(one.record.w_WB, two.record.w_WB, rtol=0, atol=1e-12)
 
 
+@pytest.mark.drill
 def test_capsules_that_come_to_lie_along_each_other_end_the_truth_with_the_reason() -> None:
     """A rod that lands parallel on another one has no one point of contact."""
     shapes = (
@@ -209,6 +214,8 @@ def test_capsules_that_come_to_lie_along_each_other_end_the_truth_with_the_reaso
     assert "the capsules of touch touch along a line at t = 0.428" in truth_of(mechanism, np.array([0.0, 1.0])).ended
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("size", "below", "closed"),
     [
@@ -278,7 +285,7 @@ def test_a_box_that_slides_over_a_rim_tips_when_its_centre_passes_it() -> None:
     assert (attitude.inv() * measured).magnitude().max() < 1e-11
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_rod_that_slides_over_a_rim_tips_on_it_and_leaves_by_its_end() -> None:
     """Its side crosses the edge where its middle passes; an independent solver moves it so until its end passes."""
     start, since = -0.02, np.array([0.0, 0.05, 0.1, 0.15])
@@ -290,7 +297,7 @@ def test_a_rod_that_slides_over_a_rim_tips_on_it_and_leaves_by_its_end() -> None
     np.testing.assert_allclose(place[:, [0, 2]], over_the_rim(since, ACROSS)[:, :2], rtol=0, atol=1e-11)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_edges_that_cross_rebound_from_each_other() -> None:
     """An edge below that falls across an edge above rebounds by its restitution, v' = -e v, without turning."""
     across = Rotation.from_rotvec([np.pi / 4, 0, 0])
@@ -311,7 +318,7 @@ def test_edges_that_cross_rebound_from_each_other() -> None:
     assert np.abs(found.record.w_WB[-1]).max() < 1e-11
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_meets_a_side_rebounds_from_it() -> None:
     """Faces that come to meet are those of the sides: a box that flies at the side of another one comes back."""
     found = followed(on_box((0.15, 0, -0.1), (-1.0, 0, 0.3), restitution=0.6), [0.0, 0.06])
@@ -322,7 +329,7 @@ def test_a_box_that_meets_a_side_rebounds_from_it() -> None:
     assert np.abs(found.record.w_WB[-1]).max() < 1e-12
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_tips_by_more_than_half_a_right_angle_ends_the_truth_with_the_reason() -> None:
     """A box that does not slip on the rim turns on until other faces meet, and the line says so."""
     found = truth_of(on_box((0.02, 0, HALF), friction=np.inf), np.array([0.0, 0.5]))
@@ -362,7 +369,7 @@ TUMBLE_FIRST = {("box", 1), ("capsule", 0)}
 
 
 @pytest.mark.nightly_of("box-1-False")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("other", "seed", "swapped"),
     [

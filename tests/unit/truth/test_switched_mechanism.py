@@ -65,6 +65,7 @@ def test_a_hinge_that_rubs_turns_seven_times_and_rests() -> None:
     assert found.record.q[1:, 0] == pytest.approx([*true["turns"], true["values"]["q.pivot"]], abs=1e-12)
 
 
+@pytest.mark.drill
 def test_an_impact_that_presses_two_stops_has_no_unique_outcome() -> None:
     """A block that rebounds from the end of a box and pushes it against its own stop leaves more than one motion."""
     joints = (
@@ -79,7 +80,7 @@ def test_an_impact_that_presses_two_stops_has_no_unique_outcome() -> None:
     assert found.record.q[:, 1] == pytest.approx([0.0, -0.05], abs=TIGHT)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_impacts_of_two_masses_that_accumulate_are_summed() -> None:
     """Two masses that fall on a stop and on each other hit without end in finite time, and then rest."""
     joints = (
@@ -115,7 +116,7 @@ def test_rebounds_come_to_rest_after_infinitely_many() -> None:
     assert found.record.q[1, 0] == pytest.approx(9.81 * fall / 8 * after - 9.81 * after**2 / 2, abs=1e-10)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_rebounds_on_a_guide_that_rubs_come_to_rest_too() -> None:
     """Friction makes each fall slower than its rise; both routes follow turns that lie 1e-12 m above the stop."""
     e, friction = 0.4, 1.0
@@ -130,6 +131,8 @@ def test_rebounds_on_a_guide_that_rubs_come_to_rest_too() -> None:
     assert found.record.q[-1, 0] == 0.0
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("0.7-0.1-6")
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(("restitution", "impacts"), [(0.1, 6), (0.01, 3), (0.001, 2)])
@@ -145,6 +148,8 @@ def test_which_rebound_is_the_last_hangs_on_no_digit(restitution: float, impacts
     assert [event.kind for event in found.events] == ["impact"] * impacts + ["settle"]
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize(("height", "restitution"), [(0.0, 1.0), (1e-9, 0.5)])
 def test_what_lies_on_a_stop_or_nearly_so_comes_to_rest(height: float, restitution: float) -> None:
     """Rebounds that are round-off do not go on for ever, and nothing is dropped on the stop that it lies on."""
@@ -157,6 +162,7 @@ def test_what_lies_on_a_stop_or_nearly_so_comes_to_rest(height: float, restituti
     assert all(event.time_low <= 3 * np.sqrt(2 * height / 9.81) <= event.time_high for event in ends)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
     ("part", "known"), [(-1e-6, True), (-1e-11, False), (0.0, False), (1e-11, False), (1e-6, True)]
@@ -228,6 +234,7 @@ def test_two_joints_that_feel_each_other_stick_and_slip_alike_in_both_routes() -
     assert found.bars["q"][-1] < 1e-9
 
 
+@pytest.mark.drill
 def test_a_stop_that_is_never_reached_changes_nothing() -> None:
     """A pendulum between stops that it does not reach has the truth of one without."""
     free = mechanism_named("pendulum", angle=0.5)
@@ -258,6 +265,8 @@ def test_bad_laws_are_one_line(more: dict[str, object], said: str) -> None:
     assert said in str(raised.value)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("ratio", [-0.7, 1.3])
 def test_joints_that_share_one_freedom_turn_together(ratio: float) -> None:
@@ -281,6 +290,7 @@ def test_joints_that_share_one_freedom_turn_together(ratio: float) -> None:
     assert np.isinf(found.horizon)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
     ("scene", "parameters", "edge"),
@@ -396,6 +406,7 @@ def swing_to_a_stop(inside: float, restitution: float) -> Mechanism:
     return Mechanism((Body("mass", 1.0, inertia=(1.0, 1.0, 1.0)),), (joint,), gravity=(0.0, 0.0, 0.0))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 @pytest.mark.parametrize("inside", [1e-10, 1e-15, 0.0, -1e-15, -1e-12])
@@ -406,6 +417,8 @@ def test_a_joint_that_grazes_its_stop_is_ill_posed(inside: float, restitution: f
     assert found.events == ()
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.drill_of("-1e-06-0")
 @pytest.mark.parametrize(("inside", "impacts"), [(1e-6, 1), (-1e-6, 0)])
 def test_a_joint_that_passes_or_misses_its_stop_for_certain_is_well_posed(inside: float, impacts: int) -> None:
@@ -418,6 +431,7 @@ def test_a_joint_that_passes_or_misses_its_stop_for_certain_is_well_posed(inside
     assert found.record.q[-1, 0] == pytest.approx(reach * np.cos(2.0 - hit), abs=TIGHT)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("apart", [1e-12, 0.0, -1e-12])
 def test_spheres_that_graze_each_other_are_ill_posed(apart: float) -> None:

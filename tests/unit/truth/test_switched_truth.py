@@ -84,6 +84,7 @@ def test_a_smooth_ladder_leaves_its_wall_at_two_thirds() -> None:
     assert np.sin(angle) == pytest.approx(2 / 3 * np.sin(1.2), abs=1e-9)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("kind", "room", "mu"), [("free", 1e-6, 0.3), ("planar", 0.25, 0.1)])
 def test_a_ball_that_slides_round_a_bore_rolls_when_its_path_says(kind: str, room: float, mu: float) -> None:
@@ -110,6 +111,7 @@ def test_a_ball_that_slides_round_a_bore_rolls_when_its_path_says(kind: str, roo
     assert found.record.p_WB[1, 0, :2] == pytest.approx(there, abs=1e-10 * room)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("other", [0.0, 0.3])
 def test_a_tip_on_a_turning_arm_rubs_against_its_own_motion(other: float) -> None:
@@ -156,7 +158,7 @@ def test_infinitely_many_impacts_end_when_their_sum_says() -> None:
 
 
 @pytest.mark.nightly_of("0.2")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_the_error_of_rebounds_cut_short_is_within_the_bars(friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Infinitely many rebounds are summed from some on: where that begins changes the motion within its bars."""
@@ -219,6 +221,8 @@ def test_a_disc_that_lands_flat_is_refused(restitution: float) -> None:
     assert found.record.time.tolist() == [0.0, 0.1]
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("friction", [0.0, 2.0])
 def test_a_disc_that_tips_until_it_lies_flat_is_refused_with_the_time(friction: float) -> None:
     """A disc let go on its edge falls on its face, on a smooth floor and on one that holds it; it is told when."""
@@ -252,6 +256,7 @@ def test_a_smooth_plank_that_falls_flat_rests() -> None:
     assert found.pressed[1, :, 2] == pytest.approx([4.905, 4.905], abs=DIGITS)
 
 
+@pytest.mark.drill
 def test_early_events_lie_within_their_brackets() -> None:
     """Round-off of a velocity moves an event by as much soon after the start as later; times of an extended solver."""
     inertia = ((0.06, 0, 0), (0, 0.05650875312070695, 0), (0, 0, 0.06))
@@ -271,7 +276,7 @@ def test_early_events_lie_within_their_brackets() -> None:
     assert stick.time_high - stick.time_low < 1e-14
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_stops_with_friction_beside_contact_are_followed_to_the_stop() -> None:
     """A joint with both stays on its stop, where the shares of what holds it are not determinate."""
     times = np.array([0.0, 0.05, 0.1, 0.2])
@@ -291,6 +296,7 @@ def test_stops_with_friction_beside_contact_are_followed_to_the_stop() -> None:
     assert np.isnan(far.record.named[-1]).all()
 
 
+@pytest.mark.drill
 def test_a_joint_that_rubs_bounces_off_its_stop_beside_contacts() -> None:
     """An impact with restitution leaves the stop, so that nothing is shared there."""
     times = np.array([0.0, 0.05, 0.1, 0.2])
@@ -299,6 +305,8 @@ def test_a_joint_that_rubs_bounces_off_its_stop_beside_contacts() -> None:
     assert np.isinf(bounces.end)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("rail0", "rail2")
 @pytest.mark.parametrize(
     "rail",
@@ -326,6 +334,8 @@ def test_a_joint_that_rubs_rests_on_its_stop_and_leaves_it_beside_contacts_as_wi
         assert b.time_low <= a.time_high
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.drill_of("laws0-kinds0")
 @pytest.mark.parametrize(
     ("laws", "kinds"), [({"sole": 0.0, "pull": 3.0}, ["impact"]), ({"restitution": 0.5}, ["impact", "turn"])]
@@ -354,7 +364,7 @@ def test_engines_with_laws_of_joints_beside_contacts_are_certified(laws: dict[st
     assert not any(np.isnan(line.expected).all() for line in lines if len(line.expected))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_finger_that_meets_its_stop_lets_the_ball_go() -> None:
     """A finger with a stop flicks a ball, both routes alike: friction slows it, the stop throws it back."""
     flick = mechanism_named("flick")
@@ -382,6 +392,7 @@ def test_a_table_and_the_ball_on_it_keep_their_moment_of_momentum() -> None:
     assert energy == pytest.approx(energy[0], abs=DIGITS)
 
 
+@pytest.mark.drill
 def test_a_disc_rolls_on_its_edge_without_loss() -> None:
     """Rolling keeps the energy of a tilted disc, whose edge touches at every time."""
     found = motion("tilted_disc", [0.0, 0.2])
@@ -428,6 +439,8 @@ def test_a_box_that_slides_straight_on_four_corners_stops_where_coulomb_says() -
     assert np.isnan(found.pressed[..., :3]).all()
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("mu", "tilt"), [(0.0, 0.0), (0.0, 0.3), (0.1, 0.3)])
 def test_a_box_slides_straight_down_a_slope(mu: float, tilt: float) -> None:
     """A box that is heavier at one corner moves as a point does, though the smallest forces would pull at the other."""
@@ -439,6 +452,7 @@ def test_a_box_slides_straight_down_a_slope(mu: float, tilt: float) -> None:
     assert max(float(bar[-1]) for bar in found.bars.values()) < BARS
 
 
+@pytest.mark.drill
 def test_a_bead_that_slides_straight_up_a_slope_turns_and_slides_down() -> None:
     """Where friction does not hold it, its slip turns at the top, though its surface lets it slide anywhere."""
     tilt, mu = 0.5, 0.2
@@ -472,6 +486,7 @@ def test_a_box_that_turns_as_it_slides_on_four_corners_is_ill_posed_and_certifie
     assert run.attrs["status"] == "done", run.attrs["message"]
 
 
+@pytest.mark.nightly
 def test_a_box_that_begins_to_turn_as_it_slides_is_ill_posed_from_there_on() -> None:
     """A spring off its middle turns a box that slid straight: its truth ends where the split first counts."""
     pull = Spring("pull", "world", "box", (0.0, 3.0, 0.1), (0.1, 0.0, 0.0), stiffness=0.5, length=2.9)
@@ -482,6 +497,7 @@ def test_a_box_that_begins_to_turn_as_it_slides_is_ill_posed_from_there_on() -> 
     assert found.bars["p_WB"][1] < DIGITS
 
 
+@pytest.mark.drill
 def test_a_row_of_balls_ends_at_its_impact_and_keeps_momentum_and_energy() -> None:
     """Whichever of two impacts at once comes first decides where balls go: only what no order changes can be judged."""
     scene = load_scene("cradle")
@@ -496,6 +512,7 @@ def test_a_row_of_balls_ends_at_its_impact_and_keeps_momentum_and_energy() -> No
         assert np.abs(found[item.name].to_numpy()).max() < 1e-9
 
 
+@pytest.mark.drill
 def test_a_rod_that_leans_against_its_slip_has_no_truth() -> None:
     """Where a normal force would tear, the scene is refused with the reason, and below that friction it is not."""
     with pytest.raises(NotUnique, match=r"^contact would not press but tear from t = 0 s on: .* \(Painlevé\)$"):
@@ -503,6 +520,7 @@ def test_a_rod_that_leans_against_its_slip_has_no_truth() -> None:
     motion("painleve_rod", [0.0, 0.01], friction=0.5)
 
 
+@pytest.mark.drill
 def test_the_sum_of_forces_at_corners_is_known_where_their_split_is_not() -> None:
     """A cube at rest presses with its weight, though no equation says how its corners share that."""
     body = Body("cube", 10.0, inertia=(0.3, 0.3, 0.3))
@@ -518,6 +536,7 @@ def test_the_sum_of_forces_at_corners_is_known_where_their_split_is_not() -> Non
     assert found["pair_forces"].attrs["error_bar"] < 1e-9
 
 
+@pytest.mark.drill
 def test_the_sum_of_parallel_cables_is_given_by_name_where_no_single_pull_is_known() -> None:
     """A box on four cables hangs by its weight, and what is not determinate at the last time says so."""
     box = Body("box", 5.0, inertia=(0.8, 0.8, 0.8))
@@ -571,6 +590,7 @@ def test_what_no_route_follows_is_refused_and_not_called_ill_posed(monkeypatch: 
     assert np.isnan(replace(element).first_motion.acceleration).all()
 
 
+@pytest.mark.drill
 def test_residuals_of_the_truth_are_within_their_bars() -> None:
     """Each residual of Coulomb's law, which is zero for the truth, is no larger than its own error bar says."""
     found = truth(load_scene("sled"), np.array([0.0, 0.1, 0.2]))
@@ -580,6 +600,7 @@ def test_residuals_of_the_truth_are_within_their_bars() -> None:
         assert float(np.nanmax(np.abs(found[name].to_numpy()))) <= bar, name
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("part", [-20, -1, 0, 1])
 def test_a_ball_that_just_rolls_is_ill_posed(part: int) -> None:
@@ -661,7 +682,7 @@ def test_a_finger_pushes_a_ball_and_lets_go() -> None:
     assert found.record.named[:, 0] == pytest.approx([0.6, 0.6], abs=1e-14)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("finger", "swing", "mass"),
     [
@@ -702,6 +723,8 @@ def dropped_box(
     return replace(mechanism, **changed)
 
 
+@pytest.mark.drill
+@pytest.mark.nightly_of("2.0", "0.0")
 @pytest.mark.parametrize("slip", [0.0, 0.3, pytest.param(2.0, marks=pytest.mark.drill)])
 def test_a_box_that_lands_flat_has_a_truth_to_its_rest(slip: float) -> None:
     """Its face lands as one: it stops at once if friction can do that, or slides on by Coulomb's law."""
@@ -739,6 +762,7 @@ def on_a_ring_of_feet(count: int, speed: float, spin: float = 0.0) -> Mechanism:
     return Mechanism((plate,), (free,), gravity=(0.0, 0.0, -9.81), geometries=shapes, pairs=pairs)
 
 
+@pytest.mark.nightly
 def test_a_plate_slides_straight_on_eight_feet() -> None:
     """More contacts than all modes can be tried of have an answer: the plate moves as a point that friction brakes."""
     found = truth_of(on_a_ring_of_feet(8, 1.0), np.array([0.0, 0.05]))
@@ -747,6 +771,8 @@ def test_a_plate_slides_straight_on_eight_feet() -> None:
     assert found.record.p_WB[1, 0] == pytest.approx([0.6 * way, 0.8 * way, 0.1], abs=DIGITS)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.nightly
 @pytest.mark.drill_of("0.01")
 @pytest.mark.parametrize("spinning", [0.0, 0.01])
 def test_feet_that_resist_rolling_leave_the_turn_of_a_plate_open_unless_they_hold_its_spin(spinning: float) -> None:
@@ -782,7 +808,7 @@ def test_a_box_that_lands_on_an_edge_tips_on_its_face_and_rests() -> None:
     assert found.record.q_WB[2, 0] == pytest.approx([1, 0, 0, 0], abs=DIGITS)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_lands_on_a_cart_moves_on_with_it() -> None:
     """Momentum along the rail is shared: four corners stick on a plate that moves."""
     box = dropped_box()
@@ -795,7 +821,7 @@ def test_a_box_that_lands_on_a_cart_moves_on_with_it() -> None:
     assert found.record.v_WB[2, :, 0] == pytest.approx(0.5 * 50 / 52, abs=DIGITS)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_box_that_bounces_flat_comes_to_rest_when_its_rebounds_are_summed() -> None:
     """With e = 1/2 the flights last 2 e^n t, t the fall: at 3 t it rests, flat, where it was dropped."""
     falls = float(np.sqrt(0.2 / 9.81))
@@ -806,6 +832,7 @@ def test_a_box_that_bounces_flat_comes_to_rest_when_its_rebounds_are_summed() ->
     assert found.record.p_WB[2, 0] == pytest.approx([0, 0, 0.1], abs=DIGITS)
 
 
+@pytest.mark.drill
 def test_what_begins_to_move_slowly_beside_bodies_at_rest_is_followed() -> None:
     """A pole 1e-11 rad from upright falls away from there while a ball rests: q = q0 cosh(t sqrt(m g s / I))."""
     pole, ball = Body("pole", 1.0, com=(0.0, 0.0, 0.5), inertia=(0.1,) * 3), Body("ball", 1.0, inertia=(0.01,) * 3)

@@ -105,6 +105,8 @@ def wound_up():
     return Mechanism((body,), (joint,), gravity=(0.0, 0.0, -9.81))
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("turns_over", [False, True])
 def test_a_route_that_loses_energy_shows_no_chaos(scene, monkeypatch, turns_over):
     """A truth ends where a route changes the energy, however fast small differences grow, and keeps what is before."""
@@ -175,7 +177,7 @@ def test_growth_is_the_same_by_another_arithmetic(scene, monkeypatch):
     assert growths[1] == pytest.approx(growths[0], rel=1e-4)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_singular_poses_are_passed_by_the_closed_form(scene):
     """Where error control stalls, the closed form is the truth and equal steps of another route its witness."""
     truth = find_truth(scene("four_bar", windows=1), np.array([0.0, 1.0]))
@@ -183,7 +185,7 @@ def test_singular_poses_are_passed_by_the_closed_form(scene):
     assert truth.bars["points"][-1] < 1e-8
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_the_witness_of_a_closed_form_does_not_know_is_not_known(scene, monkeypatch):
     """A value that only one route has is no agreement."""
     recorded = JointCoordinates.recorded
@@ -197,7 +199,7 @@ def test_what_the_witness_of_a_closed_form_does_not_know_is_not_known(scene, mon
     assert np.isinf(truth.bars["p_WB"]).tolist() == [False, True]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_singular_poses_without_a_closed_form_end_a_truth(scene):
     """Values before the pose are kept; its time and the reason are said."""
     crank = {"crank": 0.3999999999999, "speed": 3.0}
@@ -247,6 +249,7 @@ def test_a_joint_that_swings_to_its_very_limit_stays_within(scene):
         assert truth_of(mechanism, np.linspace(0, 1.0, 3)).end == np.inf
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("size", [1.0, 2.0**-10])
 def test_routes_on_different_branches_are_no_truth(scene, monkeypatch, size):
@@ -267,6 +270,7 @@ def test_routes_on_different_branches_are_no_truth(scene, monkeypatch, size):
     assert found.ended == "the two routes part, as at a singular pose"
 
 
+@pytest.mark.drill
 def test_without_heyoka_the_second_route_is_dop853(scene, monkeypatch):
     """The truth is still known by two routes, and says which."""
     monkeypatch.setattr(maximal_taylor, "heyoka", None)
@@ -275,6 +279,7 @@ def test_without_heyoka_the_second_route_is_dop853(scene, monkeypatch):
     assert truth.bars["q"][-1] < 1e-11
 
 
+@pytest.mark.drill
 def test_indeterminate_reactions_are_not_given(scene):
     """Of planar loops closed by revolutes, only Fx, Fy, Mz carry numbers."""
     pytest.importorskip("heyoka")
@@ -282,7 +287,7 @@ def test_indeterminate_reactions_are_not_given(scene):
     assert (np.isnan(wrench) == [False, False, True, True, True, False]).all()
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_heavy_slider_drives_its_crank_through_the_dead_point(scene):
     """At a million times the crank's mass its speed peaks for a short moment, and no route takes that for a stall."""
     heavy = scene("slider_crank", slider_mass=4e5)
@@ -303,6 +308,7 @@ def agreed(mechanism):
     return found
 
 
+@pytest.mark.drill
 def test_bodies_without_inertia_are_carried_by_others(monkeypatch):
     """Massless bodies and point masses on fixed joints: both routes agree on the motion and on every wrench.
 
@@ -346,6 +352,8 @@ IN_PLANE = (
 )
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("joints", "hand", "point", "gravity", "body", "compiled"),
     [
@@ -378,6 +386,8 @@ TURNED = [
 ]
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize(("orientation", "axis"), TURNED)
 def test_a_hinge_whose_child_is_turned_has_a_truth(orientation, axis, monkeypatch):
     """A damped rod that is turned against the world at q = 0 moves in a plane: both routes agree on its motion."""
@@ -388,6 +398,7 @@ def test_a_hinge_whose_child_is_turned_has_a_truth(orientation, axis, monkeypatc
     agreed(mechanism)
 
 
+@pytest.mark.drill
 def test_a_body_whose_plane_is_turned_is_held_by_no_row():
     """Rows that hold a planar body in its plane are round-off, however its frames are turned, and count as none."""
     random = np.random.default_rng(0)
@@ -426,6 +437,7 @@ def test_energy_of_a_wound_spring_needs_no_more_samples_than_asked_for(monkeypat
     assert np.ptp(energy.to_numpy()) < energy.attrs["error_bar"] < 1e-9
 
 
+@pytest.mark.drill
 def test_the_bar_of_drift_covers_its_round_off(scene):
     """Joints are never open in truth; what is seen of that, and round-off of places and cosines, is the bar."""
     mechanism = scene("oscillators")
@@ -445,6 +457,7 @@ def test_the_bar_of_energy_knows_the_round_off_of_what_cancels():
     assert 240 * np.finfo(float).eps < found.bars["energy"][0] < 1e-11
 
 
+@pytest.mark.drill
 @pytest.mark.arithmetic
 def test_routes_of_a_spinning_body_agree(scene):
     """Ten seconds about the intermediate axis: attitudes and points within what turning over makes of round-off.
@@ -458,6 +471,7 @@ def test_routes_of_a_spinning_body_agree(scene):
     assert max(found.differences["q_WB"], found.differences["points"]) < 2e-10
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("False-switching", "True-smooth")
 @pytest.mark.drill
 @pytest.mark.parametrize("route", [find_truth, switched_truth], ids=["smooth", "switching"])
@@ -475,6 +489,7 @@ def test_a_failure_of_the_rates_ends_the_truth_at_its_time(monkeypatch, route, c
         assert found.ended.startswith("the bushing mount turns by more than 3 rad")
 
 
+@pytest.mark.nightly
 @pytest.mark.nightly_of("50.0-0.00655755831")
 @pytest.mark.parametrize(
     ("until", "place"),

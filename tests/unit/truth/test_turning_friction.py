@@ -56,6 +56,7 @@ def bar(found: Any, field: str) -> float:
     return float(np.max(found[field].attrs["error_bar"]))
 
 
+@pytest.mark.drill
 def test_a_spin_ends_when_its_friction_says() -> None:
     """A ball that spins about the normal slows by f N/J and stands after J ω/(f N)."""
     f, spin = 2e-3, 30.0
@@ -66,6 +67,8 @@ def test_a_spin_ends_when_its_friction_says() -> None:
     assert expected[-1] == 0.0
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("f", "rolls"), [(0.004, True), (0.02, False)])
 def test_a_ball_on_a_slope_rolls_where_its_resistance_is_less_than_the_pull(f: float, rolls: bool) -> None:
     """From rest it stays if f cos α ≥ a sin α, and else starts with the acceleration of a ball that resists."""
@@ -76,6 +79,7 @@ def test_a_ball_on_a_slope_rolls_where_its_resistance_is_less_than_the_pull(f: f
     assert abs(at(found, "p_WB")[-1, 0] - moved) <= bar(found, "p_WB") <= 1e-11
 
 
+@pytest.mark.drill
 def test_a_ball_that_slips_and_rolls_has_both_laws() -> None:
     """While it slips, its centre slows by μ g, and its back spin by (μ a + f) m g/J."""
     mu, f, speed, spin, time = 0.2, 0.003, 1.0, 60.0, 0.2
@@ -85,7 +89,7 @@ def test_a_ball_that_slips_and_rolls_has_both_laws() -> None:
     assert abs(at(found, "w_WB")[-1, 1] + spin - slows * time) <= bar(found, "w_WB") <= 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_both_routes_agree_on_a_ball_of_unequal_moments() -> None:
     """A ball with three moments of inertia lands, slips, rolls and spins with all laws at once."""
     pair = law(0.3, rolling_resistance=1e-3, spinning_friction=2e-3)
@@ -95,6 +99,8 @@ def test_both_routes_agree_on_a_ball_of_unequal_moments() -> None:
     assert np.isfinite(at(found, "p_WB")).all()
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (-1.9, 0.8, 0.6)])
 def test_an_impact_with_friction_against_turning_happens_once(rpy: tuple[float, float, float]) -> None:
@@ -106,6 +112,7 @@ def test_an_impact_with_friction_against_turning_happens_once(rpy: tuple[float, 
     assert [event.kind for event in found.events] == ["impact"]
 
 
+@pytest.mark.drill
 def test_friction_against_spin_turns_with_the_normal_of_a_bore() -> None:
     """A ball that spins as it slides round a bore keeps the law of the moment against its spin in both routes."""
     bore, out = 0.2, 0.2 - RADIUS
@@ -118,6 +125,8 @@ def test_friction_against_spin_turns_with_the_normal_of_a_bore() -> None:
     assert LAWS in found
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (0.7, -1.1, 2.3)])
 def test_a_planar_joint_bears_what_friction_against_spin_would(rpy: tuple[float, float, float]) -> None:
@@ -135,7 +144,7 @@ def test_a_planar_joint_bears_what_friction_against_spin_would(rpy: tuple[float,
     assert np.linalg.norm(moves[0]) == pytest.approx(0.5 - 0.1 * G * 0.1, abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_bounce_has_a_bar_for_its_last_instants() -> None:
     """An impact has no moment of friction, so the bar covers the short time of the bounces that are left out."""
     scene = ball(law(0.3, restitution=0.4, rolling_resistance=1e-3), (0.8, 0.3, 0, 4.0, -20.0, 9.0), 0.08)
@@ -156,6 +165,8 @@ def test_a_coefficient_below_zero_is_refused_by_its_name() -> None:
         law(spinning_friction=-1.0)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("laws3-velocity3-0.06-0.0")
 @pytest.mark.parametrize(
     ("laws", "velocity", "height", "slope"),
@@ -184,6 +195,8 @@ def test_the_projection_solver_follows_friction_against_turning(
     assert max(item.error for item in moved) < 1e-11  # 1e-13 is seen
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.nightly_of(
     "laws1-velocity1-0.2-exudyn[formulation=spheres]-errors2",
     "laws0-velocity0-0.0-exudyn[formulation=spheres]-errors2",
@@ -218,6 +231,8 @@ def test_engines_follow_friction_against_turning(
         assert np.abs(at(run, field) - at(right, field)).max() < error
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "friction", [{"rolling_resistance": 0.01}, {"rolling_resistance": 0.01, "spinning_friction": 0.01}]
 )
@@ -233,6 +248,8 @@ def test_the_projection_solver_holds_what_its_weight_would_turn(friction: dict[s
     np.testing.assert_allclose(at(run, "p_WB")[-1], [0.2, 0.0, RADIUS], atol=1e-13)  # m
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("engine", "error"), [("projection", 1e-11), ("pinocchio[formulation=impulses]", 1e-2)])
 def test_a_growing_moment_turns_a_ball_once_it_exceeds_its_friction(engine: str, error: float) -> None:
     """Against a moment k t a ball stands until k t = f m g, and then has the spin k (t - f m g/k)²/(2 J)."""
@@ -247,6 +264,7 @@ def test_a_growing_moment_turns_a_ball_once_it_exceeds_its_friction(engine: str,
     np.testing.assert_allclose(at(run, "w_WB")[:, 2], spin, atol=error)  # rad/s; of first order 7e-3
 
 
+@pytest.mark.nightly
 def test_the_iteration_around_pinocchios_solver_leaves_no_error_of_its_own() -> None:
     """Along a line the midpoint has no error, and the moments are found closer than the solver finds its impulses."""
     scene = ball(law(rolling_resistance=2e-3), (0.3, 0, 0, 0, 6, 0))
@@ -259,6 +277,8 @@ def test_the_iteration_around_pinocchios_solver_leaves_no_error_of_its_own() -> 
     )  # m; 3e-14 is seen, and 6e-12 a thousand times looser
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -1.1, 2.3)])
 def test_a_free_joint_bears_nothing_once_a_spin_has_stopped(turn: tuple[float, float, float]) -> None:
     """Forces and moments of a free joint are 0 and determinate, also while friction against spinning holds its ball."""

@@ -50,7 +50,7 @@ _TURNS = [Rotation.identity(), Rotation.from_euler("xyz", [0.4, -1.1, 2.3])]
 
 
 @pytest.mark.nightly_of("level")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(("turn", "along"), [(_TURNS[0], 2.0), (_TURNS[1], 0.0)], ids=["level", "turned"])
 def test_a_pulled_box_slips_with_all_its_feet(turn: Rotation, along: float) -> None:
     """It slips where the pull reaches μ times its weight, and moves as a point, in any direction and any axes."""
@@ -67,6 +67,7 @@ def test_a_pulled_box_slips_with_all_its_feet(turn: Rotation, along: float) -> N
     assert max(float(bar[-1]) for bar in found.bars.values()) < 1e-9
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("seed", [5, 6])
 def test_a_box_that_drops_flat_on_a_steep_slope_slides_on_in_any_axes(seed: int) -> None:
@@ -107,7 +108,7 @@ def _pushed_tripod(friction: tuple[float, float, float], twist: float = 0.0) -> 
     )  # fmt: skip
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_feet_hold_as_long_as_any_distribution_of_friction_does() -> None:
     """Nothing slips before the limit load of rigid motions, 3.0330571 N, though the shortest distribution fails at 3.
 
@@ -143,6 +144,8 @@ def _grip_of_the_pin(mechanism: Mechanism, moment: float) -> float:
     return -float(minimize_scalar(excess, bounds=(-100, 100), method="bounded", options={"xatol": 1e-12}).fun)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("twist", [2.0, -2.0])
 def test_one_contact_that_shares_its_load_with_joints_holds_while_any_distribution_does(twist: float) -> None:
     """A pin on a wobbling disc holds until no force that both joints balance has its friction within the bound."""
@@ -153,7 +156,7 @@ def test_one_contact_that_shares_its_load_with_joints_holds_while_any_distributi
     assert "c begins to slip from rest" in path.ended
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_forces_of_a_shared_load_are_held_to_the_law_in_a_distribution_that_its_contacts_can_bear() -> None:
     """A pin that comes to rest on a wobbling disc breaks no law: some friction within its bound balances the joints."""
     mechanism, until = random_contacts(259)[1:]

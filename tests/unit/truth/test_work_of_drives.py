@@ -40,6 +40,8 @@ def lifting(times: FloatArray) -> FloatArray:
     return np.where(times < struck, 0.0, (G * struck + LIFT) * LIFT) + G * LIFT * (times + behind)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("count", [3, 9])
 def test_an_impulse_works_by_the_rate_of_its_drive(count: int) -> None:
     """Behind an impact the work of a drive is that of its force and of its impulse, whatever samples are asked for."""
@@ -48,6 +50,7 @@ def test_an_impulse_works_by_the_rate_of_its_drive(count: int) -> None:
     assert np.max(np.abs(found.to_numpy() - lifting(times))) < found.attrs["error_bar"] < 1e-11
 
 
+@pytest.mark.drill
 def test_a_run_is_compared_up_to_the_first_impact() -> None:
     """A run sums its work over samples, which have no impulse: behind the first impact no value is compared."""
     scene = plate_and_ball()
@@ -58,6 +61,7 @@ def test_a_run_is_compared_up_to_the_first_impact() -> None:
     assert np.array_equal(compared, TIMES[1:] < struck)
 
 
+@pytest.mark.drill
 def test_a_motor_at_its_stop_works_by_its_path_alone() -> None:
     """A finite torque does no work in an impact: behind a stop its work is torque times angle."""
     hub = Body("hub", 1.0, inertia=(0.5, 0.5, 0.5))

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, runtime_checkable
 import numpy as np
 from typing_extensions import TypeVar
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
 from proofroll.core.number_format import number, spaced
@@ -68,6 +69,14 @@ class Evidence:
     def read_back(self, quantity: str) -> bool:
         """True if the engine's own model, read back, has the scene's numbers of a quantity: no cause contradicts it."""
         return any(line["quantity"] == quantity and line["holds"] and bool(line["found"]) for line in self.lines)
+
+    def vectors(self, quantity: str, count: int) -> tuple[FloatArray, FloatArray] | None:
+        """Vectors of the certificate, found and expected, each (count, 3); None: no such line has as many."""
+        for line in self.lines:
+            if line["quantity"] == quantity and np.size(line["found"]) == np.size(line["expected"]) == 3 * count:
+                found, expected = (np.reshape(np.array(line[key], float), (-1, 3)) for key in ("found", "expected"))
+                return found, expected
+        return None
 
 
 @dataclass(frozen=True)

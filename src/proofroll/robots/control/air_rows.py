@@ -6,7 +6,7 @@ link being m v (1 + |v|) at its centre of mass, and I w (1 + |w|).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -52,6 +52,11 @@ NUMBERS: Mapping[str, tuple[str, str]] = {
 }
 
 
+def right_numbers(law: ControlLaw) -> dict[str, float]:
+    """Right values of the numbers that are parts of the right ones, or are not zero, by their names."""
+    return {"gravity": law.gravity, "effort": 1.0, "armature": float(law.armature.any())}
+
+
 def rms(values: Array) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
@@ -93,6 +98,8 @@ class AirRows:
         late: part of ``left`` that half an interval between rows makes, where steps are not the rows, (numbers,).
         size: root mean square of the forces.
         slow: True at rows at which a driven joint is about to turn back, (numbers,).
+        freedoms: numbers of each row.
+        blur: part of the columns that is noise.
     """
 
     left: Array
@@ -103,6 +110,8 @@ class AirRows:
     late: Array
     size: float
     slow: NDArray[np.bool_]
+    freedoms: int = 1
+    blur: float = 0.0
 
     def proof(self, after: float, closing: str = "with that") -> str:
         """Clause on the forces that are off, and those that a cause leaves; ``after``: their root mean square."""
@@ -110,19 +119,15 @@ class AirRows:
 
     def without(self, left_out: NDArray[np.bool_]) -> AirRows:
         """The same at fewer rows."""
-        kept = ~left_out
+        return replace(self.changed(lambda values: values[~left_out]), slow=self.slow[~left_out])
+
+    def changed(self, change: Callable[[Array], Array]) -> AirRows:
+        """The same with a change of the remainder, and of all that more of numbers takes away."""
         columns, by_joint, added = (
-            {name: item[kept] for name, item in table.items()} for table in (self.columns, self.by_joint, self.added)
+            {name: change(item) for name, item in table.items()} for table in (self.columns, self.by_joint, self.added)
         )
-        return replace(
-            self,
-            left=self.left[kept],
-            columns=columns,
-            by_joint=by_joint,
-            added=added,
-            late=self.late[kept],
-            slow=self.slow[kept],
-        )
+        left, late = change(self.left), change(self.late)
+        return replace(self, left=left, late=late, columns=columns, by_joint=by_joint, added=added)
 
     @property
     def off(self) -> float:
@@ -217,7 +222,8 @@ class AirTable:
         self.targets = record.stacked("target", law.joints)
         self.rated = _largest(record, ("v.", "v_WB.", "w_WB."))
         self.placed, self.forced = _largest(record, ("q.", "q_WB.")), _largest(record, ("effort.",))
-        speeds = np.abs([v[robot.driven[:, 1]] for _, v in states])
+        rates = np.array([v[robot.driven[:, 1]] for _, v in states])
+        speeds, self.signs = np.abs(rates), np.sign(rates)  # of the driven joints, (times, joints)
         self.slow = np.any(speeds < _SLOW * speeds.max(axis=0), axis=1)  # rows at which a joint is about to turn back
         self._forces: dict[int, AirForces] = {}
         self._stepped: dict[tuple[int, bool], Array] = {}
@@ -330,7 +336,7 @@ class AirTable:
         parts = 2 * self.placed + 2 * self.rated / (1e-300 + np.abs(v).max(axis=1)) + ROUND_OFF
         noise = np.sqrt(squares + (parts * sum(sizes))[:, None] ** 2)
         damped_v = at_v + (h * rate[:, driven] if scheme.damped or scheme.whole else 0.0)
-        of_joints = {"torque": np.ones(at_v.shape), "friction": -np.sign(at_v), "damping": -damped_v}
+        of_joints = {"torque": np.ones(at_v.shape), "friction": -self.signs[rows], "damping": -damped_v}
         of_joints |= {"stiffness": -q[:, robot.driven[:, 0]], "armature": -rate[:, driven]}
         by_joint = {
             name: whitened(robot.load(values[:, None] * np.eye(len(driven))).swapaxes(1, 2))
@@ -352,6 +358,7 @@ class AirTable:
             late=whitened(np.einsum("tij,tj->ti", M, following - rate) / 2),
             size=size if size > ROUND_OFF * rms(whitened(weight)) else 1.0,
             slow=np.repeat(self.slow[rows], into.shape[1]),
+            freedoms=into.shape[1],
         )
 
     def _drag(self, forces: Sequence[AirForces], v: Array) -> Array:

@@ -4,24 +4,50 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
+from scipy.special import gammaincc
 
 from proofroll.core.diagnosis.fitting import least_squares_parameters
-from proofroll.core.number_format import with_bar
-from proofroll.robots.control.air_rows import BY_JOINT, NUMBERS, ROUND_OFF, SAFETY, AirRows, rms
-from proofroll.robots.control.record import FITTED, LayerCause
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.number_format import error, with_bar
+from proofroll.robots.control.air_rows import (
+    BY_JOINT,
+    NUMBERS,
+    ROUND_OFF,
+    SAFETY,
+    AirRows,
+    AirTable,
+    StepScheme,
+    motion_of,
+    right_numbers,
+    rms,
+)
+from proofroll.robots.control.bookkeeping.air import AirRobot, HeldRobot
+from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, LayerCause
 from proofroll.robots.model import Array
 
 _MOST = 0.5  # part of the equations that numbers may be
 _OF_A_POINT = 4  # numbers of a mass at a point
 _LISTED = 4  # joints whose numbers are told one by one
+_WIDTHS, _DEGREE = (161, 81, 41, 21, 11), 3  # rows that are smoothed together, and degree of the polynomials
+_PARTS = 60  # such stretches in a record at least
+_WHITE = 6.0  # errors of an estimate of noise by which two differ: of neighbouring rows, and of what smoothing takes
+_QUIET = 1e-4  # part of a column's range up to which it counts as smooth
+_OF_DIFFERENCES = 20.0  # variance of third differences of white noise of variance 1
+_CHANCE, _BARS = 1e-3, 3.0  # chance of a number that is told and is not there; standard deviations in a bar
+_EACH = 2  # equations for each number at least
+_SPREAD = 5.0  # standard deviations of a sum of squares within which numbers leave as little as all of them do
+_CLEAR, _SHARE = 10.0, 0.03  # least part of a number's forces that no others make: what is left of less is their noise
 _REST = "torque"  # number of a joint that a spring needs, too: its rest is not known
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Group:
     """Numbers that are tried together.
 
@@ -121,18 +147,18 @@ def _solved(columns: Array, left: Array) -> tuple[Array, Array]:
     return values / sizes, left - scaled @ values
 
 
-def _errors(rows: AirRows, columns: Array) -> Array:
-    """Error of each number by the rounding of the record."""
+def _errors(rows: AirRows, columns: Array, values: Array) -> Array:
+    """Error of each number by the rounding of the record, and by noise of the columns, which makes numbers smaller."""
     scaled, sizes = _scaled(columns)
-    inverse = np.linalg.pinv(scaled, rcond=ROUND_OFF)
-    return np.asarray(SAFETY * rows.rounding * np.linalg.norm(inverse, axis=1) / sizes)
+    spread = np.linalg.norm(np.linalg.pinv(scaled, rcond=ROUND_OFF), axis=1)
+    return np.asarray(SAFETY * rows.rounding * spread / sizes + np.abs(values) * (rows.blur * spread) ** 2)
 
 
 def _told(
     rows: AirRows, groups: Sequence[_Group], columns: Array, values: Array, right: dict[str, float]
 ) -> Iterator[LayerCause]:
     """A cause for each kind of number beyond its error."""
-    bars, remainder = _errors(rows, columns) + ROUND_OFF, rms(rows.left - columns @ values)
+    bars, remainder = _errors(rows, columns, values) + ROUND_OFF, rms(rows.left - columns @ values)
     proof = rows.proof(remainder, "with all")
     begin = 0
     for group in groups:
@@ -183,7 +209,7 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
     if not beyond:
         return ""
     if group.kind == FITTED:
-        weight = f", {values[0]:+.3g} kg" if beyond[0] == 0 else ""
+        weight = ", {} ± {} kg more".format(*with_bar(values[0], bars[0], 1)) if beyond[0] == 0 else ""
         first = next(k for k, end in enumerate((1, 4, 10)) if beyond[0] < end)
         what = ("mass, centre and inertia of {} are others", "centre and inertia of {} are others")
         return (*what, "the inertia of {} is another")[first].format(group.where[0]) + weight
@@ -194,7 +220,7 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
     count = len(values) if group.kind != "stiffness" else len(values) // 2
     beyond = [k for k in beyond if k < count]
     words, unit = BY_JOINT[group.kind]
-    even = len(beyond) == count and np.ptp(values[:count]) <= 2 * bars[:count].max()
+    even = 1 < len(beyond) == count and np.ptp(values[:count]) <= 2 * bars[:count].max()
     if not beyond:
         return ""
     shown = [(f"all {count} joints", values[:count].mean(), bars[:count].max())] if even else []
@@ -205,3 +231,130 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
         texts.append(f"{text} ± {interval} at {where}")
     more = f" and at {len(shown) - _LISTED} more" if len(shown) > _LISTED else ""
     return f"joints have {words} {', '.join(texts)}{more} {unit} that is not told"
+
+
+def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: float) -> Layer | None:
+    """Layer of accelerations that white noise hides, with the numbers beyond their bars; None: no such noise.
+
+    Smoothing is linear. So the balance of forces holds between smoothed columns, too, as far as the masses change
+    little within the rows that are smoothed together. The noise is what all numbers leave.
+
+    Args:
+        record: of states and efforts.
+        law: the law as it should be.
+        held: the robot.
+        off: part of the forces that the right numbers leave without smoothing.
+    """
+    if (smoothed := _smoothed(record)) is None:
+        return None
+    record, noise, smooth, width = smoothed
+    robot, efforts = AirRobot.bare(held.mechanism, law), record.stacked("effort", law.joints)
+    if isinstance(motion := motion_of(record, robot), str) or efforts is None:
+        return None
+    states, moving = motion
+    table = AirTable(record, law, robot, states, efforts, held.links)
+    table.signs = smooth(table.signs)
+    instants: Any = np.arange(width, len(states) - width, width)
+    try:
+        rows = table.rows(instants, moving[0], StepScheme(), central=True)
+        lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts of other instants
+        rows, groups = _moving(rows.changed(lambda values: values - np.multiply.outer(lag, lag @ values)), law.joints)
+        others = _columns([group for group in groups if group.kind != "effort"])
+        count = int(np.linalg.matrix_rank(_scaled(others)[0], ROUND_OFF))
+        if len(rows.left) < _EACH * count:
+            return None
+        rows = _in_noise(rows, _solved(others, rows.left)[1], count)
+    except (Diverged, Refused, np.linalg.LinAlgError):  # the last: along a direction there is no noise
+        return None
+    if (chosen := _beyond_chance(rows, law.joints, count)) is None:
+        return None
+    columns = _columns(chosen) if chosen else np.zeros((len(rows.left), 0))
+    causes = tuple(_told(rows, chosen, columns, _solved(columns, rows.left)[0], right_numbers(law)))
+    told = f"white noise of up to {error(100 * noise, 1)} % of a range, smoothed over {width} rows, explains it"
+    numbers = "these numbers alone are" if causes else "no number is"
+    reason = f"the forces are off by {error(off)} of the largest; {told}, and {numbers} off by more than their bars"
+    return Layer("acceleration", reason=reason, causes=causes, undecided=True, noise=noise)
+
+
+def _smoothed(record: ControlRecord) -> tuple[ControlRecord, float, Callable[[Array], Array], int] | None:
+    """The record without most of its noise, the noise in parts of a range, what smooths, and its number of rows.
+
+    The widest smoothing counts that takes away no more of any column than white noise. None: even the narrowest does,
+    or there is no noise.
+    """
+    kinds = ("q.", "v.", "effort.", *(f"{name}." for name in BASE))
+    columns = {name: item for name, item in record.columns.items() if name.startswith(kinds) and np.ptp(item) > 0}
+    if not columns:
+        return None
+    values = np.stack([*columns.values()], axis=1)
+    ranges = np.ptp(values, axis=0)
+    noise = np.sqrt(np.mean(np.diff(values, _DEGREE, axis=0) ** 2, axis=0) / _OF_DIFFERENCES)
+    for width in (item for item in _WIDTHS if len(values) >= _PARTS * item):
+        powers = np.vander(np.arange(width) - width // 2, _DEGREE + 1, increasing=True)
+        weights = np.linalg.pinv(powers)[0]  # of rows in the middle of the polynomial through them (Savitzky and Golay)
+        smooth = partial(np.apply_along_axis, partial(np.convolve, weights, mode="same"), 0)
+        smoother, kept = smooth(values), weights[width // 2]  # kept: part of a variance that smoothing leaves
+        taken = np.sqrt(np.mean((values - smoother)[width:-width] ** 2, axis=0) / (1 - kept))
+        alike = 1 + _WHITE / math.sqrt(len(values))
+        white = (taken <= alike * noise) & (noise <= alike * taken)
+        if np.all(white | (taken <= _QUIET * ranges)) and np.any(white & (noise > _QUIET * ranges)):
+            found = dict(zip(columns, smoother.T, strict=True))
+            return replace(record, columns={**record.columns, **found}), float((noise / ranges).max()), smooth, width
+    return None
+
+
+def _in_noise(rows: AirRows, remainder: Array, count: int) -> AirRows:
+    """Rows in parts of their noise, which is what a number of independent columns leaves."""
+    by_row = remainder.reshape(-1, rows.freedoms)
+    into = np.linalg.inv(np.linalg.cholesky(by_row.T @ by_row / (len(by_row) - count / rows.freedoms)))
+
+    def whitened(values: Array) -> Array:
+        return np.asarray((into @ values.reshape(-1, rows.freedoms, values.size // len(values))).reshape(values.shape))
+
+    blur = rms(remainder) / rows.size
+    return replace(rows.changed(whitened), rounding=_BARS / SAFETY, size=1 / blur, blur=blur)
+
+
+def _beyond_chance(rows: AirRows, joints: Sequence[str], count: int) -> list[_Group] | None:
+    """Numbers that are there beyond chance, one by one; None: they leave more than noise.
+
+    ``count``: independent numbers of the robot.
+    """
+    groups, chosen = [*_single(_groups(rows, joints), joints)], list[_Group]()
+    basis, remainder = np.zeros((len(rows.left), 0)), rows.left
+    while True:
+        best, most = None, 0.0
+        for group in (item for item in groups if item not in chosen):
+            taken, numbers = _taken(group, basis, remainder)
+            gain = taken - numbers * math.log(len(remainder))
+            if numbers and gain > most and gammaincc(numbers / 2, taken / 2) * len(groups) < _CHANCE:
+                best, most = group, gain
+        if best is None:
+            free = max(count - basis.shape[1], 1)
+            more = float(remainder @ remainder) - (len(remainder) - count)
+            return chosen if more <= free + _SPREAD * math.sqrt(2 * free) else None
+        chosen.append(best)
+        basis = np.linalg.qr(_columns(chosen))[0]
+        remainder = rows.left - basis @ (basis.T @ rows.left)
+
+
+def _single(groups: Iterable[_Group], joints: Sequence[str]) -> Iterator[_Group]:
+    """Numbers of each joint and of each link, and those of the whole robot that are no sums over joints."""
+    for group in groups:
+        if group.kind == FITTED or group.kind not in BY_JOINT:
+            yield group
+        elif group.where != ("",):
+            parts = ((joint, group.columns[:, k :: len(joints)]) for k, joint in enumerate(joints))
+            yield from (_Group(group.kind, columns, (joint,) * columns.shape[1]) for joint, columns in parts)
+
+
+def _taken(group: _Group, basis: Array, remainder: Array) -> tuple[float, int]:
+    """Sum of squares that numbers take away beside a basis, and how many of them it leaves independent.
+
+    Efforts have most of the noise, so that all but a multiple of it has to be left of them.
+    """
+    parts, sizes = _scaled(group.columns)
+    least = _CLEAR * math.sqrt(len(remainder)) / sizes[0] if group.kind == "effort" else _SHARE
+    directions, values, _ = np.linalg.svd(parts - basis @ (basis.T @ parts), full_matrices=False)
+    independent = directions[:, values > least]
+    return float(np.sum((independent.T @ remainder) ** 2)), independent.shape[1]

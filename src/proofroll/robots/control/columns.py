@@ -360,8 +360,7 @@ def action_mistakes(law: ControlLaw, instants: Array) -> Iterator[ColumnMistake]
     pose = {f"action.{joint}": place for joint, place in zip(law.joints, law.pose.tolist(), strict=True)}
 
     def from_pose(record: ControlRecord) -> ControlRecord:
-        columns = {name: item - pose.get(name, 0.0) for name, item in record.columns.items()}
-        return ControlRecord(record.path, columns, record.rounding, record.time)
+        return replace(record, columns={name: item - pose.get(name, 0.0) for name, item in record.columns.items()})
 
     scaled = partial(_scaled, "action.", 1 / law.scale)
     if law.scale != 1:
@@ -378,7 +377,7 @@ def action_mistakes(law: ControlLaw, instants: Array) -> Iterator[ColumnMistake]
         for name in (name for name in columns if name.startswith("action.")):
             columns[name] = record.columns[name][instants[following]]
             rounding[name] = record.rounding[name][instants[following]]
-        return ControlRecord(record.path, columns, rounding, part.time)
+        return replace(part, columns=columns, rounding=rounding)
 
     if len(instants) > 2:
         yield ColumnMistake("late_action", "the columns of actions are one instant late", sooner)
@@ -390,32 +389,25 @@ _INVERSE: Mapping[str, str] = {"inverse": ""}
 
 def _requaternioned(change: Mapping[str, str], record: ControlRecord) -> ControlRecord:
     """The record with other columns of quaternions, and of what was turned by them."""
-    columns, rounding = dict(record.columns), dict(record.rounding)
-    for axis in BASE["q_WB"]:
-        source = f"q_WB.{change.get(axis, axis)}"
-        sign = -1.0 if "inverse" in change and axis != "w" else 1.0
-        columns[f"q_WB.{axis}"] = sign * record.columns[source]
-        rounding[f"q_WB.{axis}"] = record.rounding[source]
-    return _turned_again(ControlRecord(record.path, columns, rounding, record.time))
+    axes = {f"q_WB.{change.get(axis, axis)}": axis for axis in BASE["q_WB"]}
+
+    def renamed(name: str, item: Array) -> tuple[str, Array]:
+        axis = axes.get(name, "")
+        sign = -1.0 if "inverse" in change and axis in {"x", "y", "z"} else 1.0
+        return f"q_WB.{axis}" if axis else name, sign * item
+
+    return _turned_again(record.changed(renamed))
 
 
 def _turned_again(record: ControlRecord) -> ControlRecord:
     """The record with the velocities that it has along the axes of its base turned to the world's anew."""
     turned = tuple(f"{name}." for name in ("v_WB", "w_WB") if f"{name}_B.x" in record.columns)
-    columns, rounding = (
-        {name: item for name, item in part.items() if not (turned and name.startswith(turned))}
-        for part in (record.columns, record.rounding)
-    )
-    return in_world(ControlRecord(record.path, columns, rounding, record.time))
+    return in_world(record.changed(lambda name, item: None if name.startswith(turned) else (name, item)))
 
 
 def _along_base(kind: str, record: ControlRecord) -> ControlRecord:
     """The record with velocities that are along the axes of the base."""
-    columns, rounding = (
-        {name.replace(f"{kind}.", f"{kind}_B."): item for name, item in part.items()}
-        for part in (record.columns, record.rounding)
-    )
-    return in_world(ControlRecord(record.path, columns, rounding, record.time))
+    return in_world(record.changed(lambda name, item: (name.replace(f"{kind}.", f"{kind}_B."), item)))
 
 
 def _to_origin(centre: Array, record: ControlRecord) -> ControlRecord:
@@ -425,24 +417,16 @@ def _to_origin(centre: Array, record: ControlRecord) -> ControlRecord:
         return record
     moved = velocity - np.cross(spin, Rotation.from_quat(attitude, scalar_first=True).apply(centre))
     columns = dict(record.columns) | {f"v_WB.{axis}": moved[:, k] for k, axis in enumerate("xyz")}
-    return ControlRecord(record.path, columns, record.rounding, record.time)
+    return replace(record, columns=columns)
 
 
 def _exchanged(first: str, second: str, record: ControlRecord) -> ControlRecord:
     names = {first: second, second: first}
-    columns, rounding = (
-        {names.get(name[:2], name[:2]) + name[2:]: item for name, item in part.items()}
-        for part in (record.columns, record.rounding)
-    )
-    return ControlRecord(record.path, columns, rounding, record.time)
+    return record.changed(lambda name, item: (names.get(name[:2], name[:2]) + name[2:], item))
 
 
 def _scaled(start: str, factor: float, record: ControlRecord) -> ControlRecord:
-    columns, rounding = (
-        {name: size * item if name.startswith(start) else item for name, item in part.items()}
-        for part, size in ((record.columns, factor), (record.rounding, abs(factor)))
-    )
-    return ControlRecord(record.path, columns, rounding, record.time)
+    return record.changed(lambda name, item: (name, factor * item if name.startswith(start) else item))
 
 
 def _moved(start: str | tuple[str, ...], rows: int, record: ControlRecord) -> ControlRecord:
@@ -450,11 +434,11 @@ def _moved(start: str | tuple[str, ...], rows: int, record: ControlRecord) -> Co
     kept: Any = np.arange(max(0, -rows), len(record.time) - max(0, rows))
     part = record.part(kept)
     moved = {name: item[kept + rows] for name, item in record.columns.items() if name.startswith(start)}
-    return ControlRecord(record.path, {**part.columns, **moved}, part.rounding, part.time)
+    return replace(part, columns={**part.columns, **moved})
 
 
 def _in_seconds(record: ControlRecord) -> ControlRecord:
-    return ControlRecord(record.path, record.columns, record.rounding, _MILLI * record.time)
+    return replace(record, time=_MILLI * record.time)
 
 
 def _after(*changes: Changed) -> Changed:

@@ -1,17 +1,19 @@
-"""Scene of a robot under a controller: its actuators, their targets, and its start, in the air."""
+"""Scene of a robot under a controller, in the air, and the robots that importers make of its file."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from proofroll.core.errors import InputError, error_location
+from proofroll.core.errors import InputError, Refused, error_location
 from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.contact.start import touches
@@ -22,8 +24,8 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import TOGETHER
 from proofroll.elements.mechanism.scene.policy import PolicySource
 from proofroll.elements.mechanism.scene.rotations import from_quaternion
+from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
-from proofroll.robots.files.actuators import scene_actuators
 from proofroll.robots.files.feet import GROUNDS, NO_FLOOR, NO_GROUND, OF_FILE, StandingRobot, ground_tables
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.scene_tables import (
@@ -35,16 +37,31 @@ from proofroll.robots.files.scene_tables import (
     laws,
     names_of_bodies,
     read_robot,
+    scene_actuators,
     tables_of,
 )
+from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis, hypotheses
 from proofroll.robots.model import Array, Robot
-from proofroll.robots.protocol import lift
+from proofroll.robots.protocol import Reading, lift
 from proofroll.robots.states import RobotStates
 
 if TYPE_CHECKING:
     from proofroll.robots.control.base_frames import BaseFrame
     from proofroll.robots.control.bookkeeping.air import HeldRobot
 
+_NOTHING = Reading(
+    joints=(),
+    dofs=(),
+    mass={},
+    com={},
+    inertia={},
+    position={},
+    rotation={},
+    M=np.empty(0),
+    g=np.empty(0),
+    h=np.empty(0),
+)
+MOST = 2  # causes that act together
 _DURATION = 0.1  # s: what is wrong with the bookkeeping of a controller shows in the air within it
 _GRID, _STEP = 4e-3, 5e-4  # s: sampling of a first look, and its longest step
 _LADDER, _FINER = 4, 2  # a ladder's coarsest step has so many of the finest; steps are at most so many times finer
@@ -130,7 +147,6 @@ class ControlledScenes:
             InputError: the controller has no rate, does not fit the robot, or the robot cannot be moved.
         """
         from proofroll.robots.control.base_frames import base_frames
-        from proofroll.robots.control.imported import imported_robots
 
         controller = read_controller(self._path) if self._controlled else Controller(rate=1.0)
         if controller.rate is None:
@@ -416,3 +432,55 @@ def _times(controller: Controller, duration: float) -> dict[str, float]:
     coarsest = _LADDER * controller.period / least
     every = coarsest * max(1, round(_GRID / coarsest))
     return {"duration": every * math.ceil(duration / every - 1e-9), "dt": coarsest / _LADDER, "every": every}
+
+
+def imported_robots(
+    file: RobotFile, robot: Robot, holder: Callable[[Robot], HeldRobot], most: int = MOST
+) -> Iterator[HeldRobot]:
+    """Robots by one cause, then by two, up to ``most``.
+
+    Args:
+        file: of the robot.
+        robot: robot of the file.
+        holder: robot as a program holds it.
+        most: number of causes that act together.
+    """
+    begun: list[tuple[tuple[RobotHypothesis, ...], Robot]] = [((), robot)]
+    for _ in range(most):
+        changes, begun = _further(file, begun), []
+        for causes, other_robot in changes:
+            begun.append((causes, other_robot))
+            with suppress(InputError, Refused):
+                ids, words = tuple(item.id for item in causes), "; ".join(_told(item) for item in causes)
+                yield replace(holder(other_robot), causes=ids, words=words)
+
+
+def _further(
+    file: RobotFile, begun: Sequence[tuple[tuple[RobotHypothesis, ...], Robot]]
+) -> Iterator[tuple[tuple[RobotHypothesis, ...], Robot]]:
+    """Robots with causes and one more, each pair of causes once; one after another, as a search may end before."""
+    for causes, earlier in begun:
+        for cause in hypotheses():
+            if causes and cause.id <= causes[-1].id:
+                continue
+            if (other_robot := _changed(file, earlier, cause)) is not None:
+                yield (*causes, cause), other_robot
+
+
+def _told(cause: RobotHypothesis) -> str:
+    engines = ", ".join(" ".join(part for part in item if part) for item in cause.known.items())
+    return f"{cause.grounds}, as by {engines}: {cause.remedy}"
+
+
+def _changed(file: RobotFile, robot: Robot, cause: RobotHypothesis) -> Robot | None:
+    """Robot with a cause that needs the file alone; None: it needs more, changes nothing, or changes the joints."""
+    evidence = RobotEvidence(file=file, robot=robot, reading=_NOTHING)
+    other_robot = next(iter(cause.test(evidence)), None)
+    if not isinstance(other_robot, Robot) or other_robot is robot:
+        return None
+    return other_robot if _freedoms(other_robot) == _freedoms(robot) else None
+
+
+def _freedoms(robot: Robot) -> list[tuple[str, str]]:
+    """Joints that a record of a robot has columns of, with their kinds."""
+    return [(joint.name, joint.kind) for joint in robot.moving]

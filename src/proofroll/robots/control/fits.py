@@ -39,8 +39,8 @@ class ServoRows:
 
 def observation_causes(
     columns: Sequence[str], recorded: Array, difference: Array, sizes: Array, most: float
-) -> Iterator[tuple[int, LayerCause]]:
-    """Columns of an observation that are each a part of the right ones, or differ by a constant, with their number.
+) -> Iterator[LayerCause]:
+    """Columns of an observation that are each a part of the right ones, or differ by a constant.
 
     Args:
         columns: their names.
@@ -64,18 +64,18 @@ def observation_causes(
         residual = float((np.abs(recorded - explained) / sizes).max())
         if residual <= most and len(recorded) > _ROWS:  # of a column that hardly varies, what leaves less goes before
             listed = _listed(numbers, wrong_columns, columns, unit)
-            yield int(wrong_columns.sum()), LayerCause(name, words + listed, None, residual)
+            yield LayerCause(name, words + listed, None, residual, numbers=int(wrong_columns.sum()))
     explained = np.where(wrong_columns, slopes * right + beside, right)
     residual = float((np.abs(recorded - explained) / sizes).max())
     if residual <= most and len(recorded) > 2 * _ROWS and np.all(np.abs(slopes[wrong_columns]) > _SAME):
         sizes_told = _listed(slopes, wrong_columns, columns, " of the right one")
         words = f"parts are observed at another size and with a constant added: {sizes_told}; constants: "
         listed = words + _listed(beside, wrong_columns, columns)
-        yield 2 * int(wrong_columns.sum()), LayerCause("observed_normalised", listed, None, residual)
+        yield LayerCause("observed_normalised", listed, None, residual, numbers=2 * int(wrong_columns.sum()))
 
 
-def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tuple[int, LayerCause]]:
-    """Mistakes of efforts, each with the number of its fitted numbers.
+def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[LayerCause]:
+    """Mistakes of efforts.
 
     Args:
         rows: of the record.
@@ -89,17 +89,17 @@ def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[tupl
         return float(np.abs((efforts - recorded) / sizes).max())
 
     if len(right) > 1 and (late := left(right[:-1], rows.effort[1:])) <= most:
-        yield 0, LayerCause("late_effort", "efforts are those of the row before", None, late)
+        yield LayerCause("late_effort", "efforts are those of the row before", None, late)
     yield from _other_targets(rows, law, most, left)
     yield from _falling_limit(rows, law, most, left)
     for words, order in orders(law.joints):
         if (after := left(right[:, order])) <= most:
-            yield 0, LayerCause("effort_order", f"efforts are of joints in another order ({words})", None, after)
+            yield LayerCause("effort_order", f"efforts are of joints in another order ({words})", None, after)
     fit = _ServoFit.of(rows, law, np.asarray((np.abs(right - rows.effort) > most * sizes).any(axis=0), bool), most)
     clauses = [] if fit is None else fit.clauses(law, lambda size: left(size * right) <= most)
     if fit is not None and clauses and (after := left(fit.efforts(rows))) <= most:
         size = fit.size if len(clauses) == 1 else None
-        yield len(clauses), LayerCause("servo", "; ".join(clauses), size, after)
+        yield LayerCause("servo", "; ".join(clauses), size, after, numbers=len(clauses))
 
 
 def ramps(goals: Array) -> Iterator[Array]:
@@ -122,26 +122,26 @@ def ramps(goals: Array) -> Iterator[Array]:
 
 def _other_targets(
     rows: ServoRows, law: ControlLaw, most: float, left: Callable[[Array, Array], float]
-) -> Iterator[tuple[int, LayerCause]]:
+) -> Iterator[LayerCause]:
     """Efforts by targets that come some rows late within an instant, or along a ramp."""
     changes = np.flatnonzero(np.any(np.diff(rows.target, axis=0) != 0, axis=1))
     period = int(np.diff(changes).min()) if len(changes) > 1 else 0
     for late in range(1, period):
         efforts = law.effort(rows.target[:-late], rows.q[late:], rows.v[late:])
         if (residual := left(efforts, rows.effort[late:])) <= most:
-            yield 0, LayerCause("late_rows", f"targets act {late} rows late", float(late), residual)
+            yield LayerCause("late_rows", f"targets act {late} rows late", float(late), residual)
             break
     for target in ramps(rows.target):
         rows_told = np.isfinite(target).all(axis=1)
         efforts = law.effort(target[rows_told], rows.q[rows_told], rows.v[rows_told])
         if (residual := left(efforts, rows.effort[rows_told])) <= most:
             words = "servos follow targets along a straight line from one instant to the next"
-            yield 0, LayerCause("ramped", words, None, residual)
+            yield LayerCause("ramped", words, None, residual)
 
 
 def _falling_limit(
     rows: ServoRows, law: ControlLaw, most: float, left: Callable[[Array], float]
-) -> Iterator[tuple[int, LayerCause]]:
+) -> Iterator[LayerCause]:
     """Efforts whose limit falls with the speed, as that of a DC motor: F (1 - v / v0) along the effort, 0 at least.
 
     The limit of the law holds beside it.
@@ -160,7 +160,7 @@ def _falling_limit(
     if (residual := left(sign * np.minimum(np.abs(plain), most_effort))) <= most:
         numbers = f"{stall:.4g} at rest, 0 at a speed of {-stall / slope:.4g}"
         words = f"the limit of efforts falls with the speed along them: {numbers}"
-        yield 2, LayerCause("falling_limit", words, None, residual)
+        yield LayerCause("falling_limit", words, None, residual, numbers=2)
 
 
 @dataclass
@@ -254,8 +254,8 @@ class _ServoFit:
 
 def target_causes(
     targets: Array, actions: Array, q: Array | None, law: ControlLaw, most: float
-) -> Iterator[tuple[int, LayerCause]]:
-    """Mistakes of what actions mean, each with the number of its fitted numbers.
+) -> Iterator[LayerCause]:
+    """Mistakes of what actions mean.
 
     Args:
         targets: at successive instants, (times, joints).
@@ -270,10 +270,10 @@ def target_causes(
         return float(np.abs((computed - targets[rows]) / sizes).max())
 
     if (after := left(law.pose + law.scale * np.tanh(actions))) <= most:
-        yield 0, LayerCause("squashed", "actions pass a tanh", None, after)
+        yield LayerCause("squashed", "actions pass a tanh", None, after)
     if q is not None and (after := left(q + law.scale * actions)) <= most:
         words = "actions are added to the present coordinates, not to the default pose"
-        yield 0, LayerCause("added", words, None, after)
+        yield LayerCause("added", words, None, after)
     yield from _remembering(targets, actions, law, most, left)
     affine = _affine(targets, actions)
     if affine is None:
@@ -287,12 +287,12 @@ def target_causes(
         clauses.append(offsets_told(law.joints, moved))
     if clauses and (after := left(offset + scale * actions)) <= most:
         size = float((scale / law.scale).mean()) if len(clauses) == 1 and _alike(scale) else None
-        yield len(clauses), LayerCause("affine_target", "; ".join(clauses), size, after)
+        yield LayerCause("affine_target", "; ".join(clauses), size, after, numbers=len(clauses))
 
 
 def _remembering(
     targets: Array, actions: Array, law: ControlLaw, most: float, left: Callable[[Array, slice], float]
-) -> Iterator[tuple[int, LayerCause]]:
+) -> Iterator[LayerCause]:
     """Targets that keep a part of the target before, or of the action before."""
     if len(targets) < 3:
         return
@@ -305,7 +305,7 @@ def _remembering(
         part, rest = np.linalg.lstsq(columns, moved[1:].ravel(), rcond=_SMALL)[0]
         residual = left(law.pose + part * new[1:] + rest * previous, slice(1, None))
         if residual <= most and abs(rest) > _SAME:
-            yield 2, LayerCause(name, words.format(new=part, old=rest), float(part), residual)
+            yield LayerCause(name, words.format(new=part, old=rest), float(part), residual, numbers=2)
 
 
 def _affine(targets: Array, actions: Array) -> tuple[Array, Array] | None:

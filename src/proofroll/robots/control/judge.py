@@ -30,9 +30,8 @@ from proofroll.robots.control.columns import (
     state_readings,
     untold_lags,
 )
-from proofroll.robots.control.controlled import ControlledScenes
+from proofroll.robots.control.controlled import MOST, ControlledScenes
 from proofroll.robots.control.differences import DIFFERENCES
-from proofroll.robots.control.imported import MOST
 from proofroll.robots.control.layers import InAir, record_layers
 from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, read_record, record_of
 from proofroll.robots.control.record_arrays import ARRAYS, LAYOUTS, columns_of, floats, read_arrays
@@ -100,9 +99,10 @@ class RecordJudgement:
             yield f"{self.record} ({rows}): the {failed_layer.name} is the first layer that does not hold"
         for layer in self.layers:
             yield f"  {_mark(layer)} {layer.name} ({LAYERS[layer.name]}): {_found(layer)}"
-            if not layer.holds and (layer is failed_layer or layer.causes):
-                yield from (f"       {cause.sentence}" for cause in layer.causes[:3])
-                if not layer.causes:
+            if layer.noise or (not layer.holds and (layer is failed_layer or layer.causes)):
+                shown = layer.causes if layer.noise else layer.causes[:3]
+                yield from (f"       {cause.sentence}" for cause in shown)
+                if not (layer.causes or layer.noise):
                     yield f"       {_unexplained(layer)}"
         yield from self.remarks
 
@@ -352,7 +352,7 @@ def _open_layers(layers: Sequence[Layer]) -> set[str]:
     return {
         layer.name
         for layer in layers
-        if (layer.undecided if layer.residual is None else not (layer.holds or layer.causes))
+        if (layer.undecided and not layer.noise if layer.residual is None else not (layer.holds or layer.causes))
     }
 
 

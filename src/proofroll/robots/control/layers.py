@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
-from proofroll.robots.control.air_fit import AirFit, acceleration_fit
+from proofroll.robots.control.air_fit import AirFit, StandingFit, acceleration_fit, standing_fit
+from proofroll.robots.control.air_several import noisy_layer
 from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import (
@@ -27,14 +28,17 @@ from proofroll.robots.control.bookkeeping.mistakes import (
     offsets_told,
 )
 from proofroll.robots.control.bookkeeping.search import (
+    LayerTrials,
     MistakeExplanation,
     another_pose,
     best_size,
     bounded,
+    changed_columns,
     explanations,
     largest,
+    may_close,
+    mistakes_together,
 )
-from proofroll.robots.control.bookkeeping.together import LayerTrials, changed_columns, may_close, mistakes_together
 from proofroll.robots.control.columns import action_mistakes
 from proofroll.robots.control.differences import (
     DIFFERENCES,
@@ -53,7 +57,6 @@ from proofroll.robots.control.differences import (
 from proofroll.robots.control.fits import ServoRows, observation_causes, ramps, servo_causes, target_causes
 from proofroll.robots.control.motion import motion_layer
 from proofroll.robots.control.record import FITTED, OBSERVED, ControlRecord, Layer, LayerCause
-from proofroll.robots.control.standing_joints import StandingFit, standing_fit
 from proofroll.robots.model import Array
 
 # Remark on a scheme that has the damping of joints at the velocity after a step.
@@ -205,6 +208,10 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
             fit, off_stops, remark = rival
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
+    if fit.off > fit.bar and not fit.causes:
+        noisy = noisy_layer(record, law, evidence.in_air.held, fit.off)
+        if noisy is not None:
+            return noisy
     if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
@@ -326,7 +333,7 @@ def _explained(
         ranked += [(2 * left, cause)] if left <= _HELPS * distance else []  # its numbers are many: fewer go before
     if all(cause.after > rounding for _, cause in ranked):
         fits = _fitted_causes(name, compared, evidence, most)
-        ranked += [((1 + numbers) * cause.after, cause) for numbers, cause in fits]
+        ranked += [((1 + cause.numbers) * cause.after, cause) for cause in fits]  # a number takes away as much again
     by_words: dict[str, LayerCause] = {}
     for _, cause in sorted(ranked, key=lambda item: item[0]):
         by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
@@ -384,10 +391,8 @@ def _shows(mistake: Mistake, layers: Sequence[str]) -> bool:
     return mistake.layer in layers or (mistake.later and order.index(mistake.layer) + 1 == order.index(layers[-1]))
 
 
-def _fitted_causes(
-    name: str, compared: LayerDifferences, evidence: _Evidence, most: float
-) -> Iterator[tuple[int, LayerCause]]:
-    """Mistakes of some numbers that explain a layer, each with their count."""
+def _fitted_causes(name: str, compared: LayerDifferences, evidence: _Evidence, most: float) -> Iterator[LayerCause]:
+    """Mistakes of some numbers that explain a layer."""
     record, law = evidence.record, evidence.law
     if name == "observation":
         yield from observation_causes(compared.columns, compared.recorded, compared.difference, compared.sizes, most)
@@ -410,7 +415,7 @@ def _fitted_causes(
         yield from target_causes(targets[later], actions[source[later]], seen, law, most)
 
 
-def _ramped(evidence: _Evidence, most: float) -> Iterator[tuple[int, LayerCause]]:
+def _ramped(evidence: _Evidence, most: float) -> Iterator[LayerCause]:
     """Targets of all rows that are reached along a ramp from one instant to the next."""
     record, law = evidence.record, evidence.law
     instants, recorded = instant_rows(record, law), record.stacked("target", law.joints)
@@ -422,8 +427,7 @@ def _ramped(evidence: _Evidence, most: float) -> Iterator[tuple[int, LayerCause]
         rows_told = np.isfinite(targets).all(axis=1)
         residual = float((np.abs(targets - recorded)[rows_told] / np.abs(recorded).max(axis=0)).max())
         if residual <= most:
-            words = "targets go along a straight line from one instant to the next"
-            yield 0, LayerCause("ramped", words, None, residual)
+            yield LayerCause("ramped", "targets go along a straight line from one instant to the next", None, residual)
 
 
 def _of_columns(layer: Layer, evidence: _Evidence) -> tuple[Layer, _Evidence]:

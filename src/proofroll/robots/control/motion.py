@@ -14,8 +14,8 @@ from proofroll.robots.control.air_rows import states_of
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw, RobotState
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, SEARCH_TIME, SearchTime, mistakes
+from proofroll.robots.control.bookkeeping.screen import SHOWN, WHOLE, SeenMotion
 from proofroll.robots.control.bookkeeping.search import MotionSearch
-from proofroll.robots.control.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
 from proofroll.robots.control.record import ControlRecord, Layer
 
 _STEPS, _LEAST_STEP = (1, 2, 5, 10), 4.9e-4  # steps between rows that are tried, and the shortest [s]

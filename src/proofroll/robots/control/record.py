@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
 
@@ -71,14 +71,20 @@ class ControlRecord:
         for name, values in self.columns.items():
             runs = np.concatenate([[0], np.cumsum(np.diff(values) != 0)])
             moved[name] = values + self.rounding[name] * generator.uniform(-1, 1, values.shape)[runs]
-        return ControlRecord(self.path, moved, self.rounding, self.time)
+        return replace(self, columns=moved)
 
     def part(self, rows: Array) -> ControlRecord:
         """The record at some rows."""
+        part = self.changed(lambda name, values: (name, values[rows]))
+        return replace(part, time=self.time[rows])
+
+    def changed(self, change: Callable[[str, Array], tuple[str, Array] | None]) -> ControlRecord:
+        """The record with other names and values of columns; None: without a column. Rounding changes by its size."""
         columns, rounding = (
-            {name: item[rows] for name, item in part.items()} for part in (self.columns, self.rounding)
+            dict(filter(None, (change(name, item) for name, item in part.items())))
+            for part in (self.columns, self.rounding)
         )
-        return ControlRecord(self.path, columns, rounding, self.time[rows])
+        return replace(self, columns=columns, rounding={name: np.abs(item) for name, item in rounding.items()})
 
 
 def read_record(path: Path, names: Mapping[str, str]) -> ControlRecord:
@@ -162,7 +168,7 @@ def in_world(record: ControlRecord) -> ControlRecord:
         bars = bars + 2 * record.rounding_of("q_WB", "wxyz").sum(axis=1) * np.linalg.norm(vectors, axis=1)
         for k, axis in enumerate("xyz"):
             columns[f"{name}.{axis}"], rounding[f"{name}.{axis}"] = turned[:, k], bars
-    return ControlRecord(record.path, columns, rounding, record.time)
+    return replace(record, columns=columns, rounding=rounding)
 
 
 def _decimal_roundings(columns: Mapping[str, Array], digits: float) -> dict[str, float]:
@@ -224,12 +230,21 @@ def _roundings(columns: Mapping[str, Array]) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class LayerCause:
-    """Mistake that explains a layer: its name, a sentence, its size (None: it has none), and the residual with it."""
+    """Mistake that explains a layer.
+
+    Attributes:
+        id: its name.
+        sentence: clause for a person.
+        size: its size; None: it has none.
+        after: residual with it.
+        numbers: count of fitted numbers.
+    """
 
     id: str
     sentence: str
     size: float | None
     after: float
+    numbers: int = 0
 
 
 @dataclass(frozen=True)
@@ -246,6 +261,7 @@ class Layer:
         causes: mistakes that explain it, the best first.
         tried: number of mistakes that were tried, of those that are ``known``.
         undecided: True if it differs and the record does not tell whether that counts.
+        noise: white noise of the record that hides it, in parts of a column's range; causes then are what it shows.
     """
 
     name: str
@@ -258,6 +274,7 @@ class Layer:
     tried: int = 0
     known: int = 0
     undecided: bool = False
+    noise: float = 0.0
 
     @property
     def holds(self) -> bool:

@@ -10,8 +10,7 @@ from xml.etree.ElementTree import Element, fromstring
 from proofroll.core.errors import InputError
 from proofroll.core.limits import TIME_LIMIT
 from proofroll.robots.files import reading
-from proofroll.robots.files.definer import AnswersQuestions, Definer
-from proofroll.robots.files.mjcf.compiler import Compiler, compiled_robot, expand
+from proofroll.robots.files.mjcf.compiler import AnswersQuestions, Compiler, Definer, compiled_robot, expand
 from proofroll.robots.files.opening import open_robot
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.urdf import read_urdf

@@ -1,15 +1,21 @@
-"""Causes that change masses and inertias given in the file: impossible, small, rotated or scaled ones."""
+"""Causes that change masses and inertias: of the file, of its shapes, or of links joined by fixed joints."""
 
 import copy
 import dataclasses
-from collections.abc import Callable, Iterator
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.robots.hypotheses import LEAST, WRITE_INERTIALS, RobotEvidence, hypothesis, with_weightless
-from proofroll.robots.model import Array, Robot, RobotBody
+from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody, composed
 
+# Bullet's margin around the box of a body's shapes, also if it has no shape [m].
+_MARGIN = 1e-3
 # Attributes of the <inertia> of a URDF; its specification requires all.
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -166,3 +172,213 @@ def total_mass_ignored(evidence: RobotEvidence) -> Robot | None:
         dataclasses.replace(body, mass=factor * body.mass, inertia=factor * body.inertia)
         for body in robot.bodies.values()
     )
+
+
+def _moments(inertia: Array) -> Array:
+    """Principal moments, each at the index of the coordinate axis nearest to its own axis, shape (3,)."""
+    from scipy.optimize import linear_sum_assignment  # a tenth of a second, which few checks need
+
+    values, axes = np.linalg.eigh(inertia)
+    _, order = linear_sum_assignment(-np.abs(axes))
+    return np.asarray(values[order])
+
+
+@hypothesis({"pybullet": "3.2.7 with URDF_MERGE_FIXED_LINKS"}, "load without URDF_MERGE_FIXED_LINKS")
+def merged_at_link_origins(evidence: RobotEvidence) -> Robot:
+    """Links at fixed joints are merged by their origins: inertial origins and rotations are dropped.
+
+    Their principal moments are taken about the axes of the whole.
+    """
+    robot = evidence.robot
+    bodies: list[RobotBody] = []
+    for home in robot.columns:
+        members = [(name, p, R) for name, (carrier, p, R) in robot.welded.items() if carrier == home]
+        if len(members) == 1:
+            continue
+        for name, _, R in members:
+            body = robot.bodies[name]
+            written = np.array(robot.sources.get(name, {}).get("written", body.inertia))
+            inertia = R.T @ np.diag(_moments(written)) @ R  # in the link's frame: diagonal in the axes of the composite
+            bodies.append(dataclasses.replace(body, com=np.zeros(3), inertia=inertia))
+    return robot.with_bodies(bodies)
+
+
+# Off-diagonal element at which MuJoCo's Jacobi rotations end; moments that differ by less count as equal.
+_SMALL = 1e-12
+
+
+def _principal(inertia: Array) -> tuple[Array, Array]:
+    """Principal moments, descending, shape (3,), and axes as columns, shape (3, 3), chosen as MuJoCo does."""
+    axes = np.eye(3)
+    for _ in range(500):
+        turned = axes.T @ inertia @ axes
+        off = {2: (0, 1), 1: (0, 2), 0: (1, 2)}
+        about = max(off, key=lambda axis: (abs(turned[off[axis]]), -axis))
+        i, j = off[about]
+        if abs(turned[i, j]) < _SMALL:
+            break
+        tau = (turned[j, j] - turned[i, i]) / (2 * turned[i, j])
+        tangent = (1 if tau >= 0 else -1) / (abs(tau) + np.hypot(1, tau))
+        angle = np.arctan(tangent) * (1 if about == 1 else -1)
+        axes = axes @ Rotation.from_rotvec(angle * np.eye(3)[about]).as_matrix()
+    moments = np.diag(axes.T @ inertia @ axes).copy()
+    for column in (0, 1, 0):
+        if moments[column] + _SMALL < moments[column + 1]:
+            moments[[column, column + 1]] = moments[[column + 1, column]]
+            axes = axes @ Rotation.from_rotvec(np.pi / 2 * np.eye(3)[(column + 2) % 3]).as_matrix()
+    return moments, axes
+
+
+def _misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot:
+    """Robot with misplaced inertials of merged links, see :func:`merged_inertial_misplaced`.
+
+    Principal axes are Q R if ``turned``, else Q.
+    """
+    robot, bodies = evidence.robot, []
+    for joint in robot.joints:
+        home, p, R = robot.welded[joint.child]
+        body = robot.bodies[joint.child]
+        if joint.dofs or home == NO_BODY or not body.mass:
+            continue
+        source = robot.sources.get(joint.child, {})
+        moments, Q = _principal(np.array(source.get("written", body.inertia)))
+        # c + Q p and axes Q R are in the frame of the moving link; here they are transformed to the merged link's own
+        axes, com = R.T @ (Q @ R if turned else Q), R.T @ (body.com + Q @ p - p)
+        bodies.append(dataclasses.replace(body, com=com, inertia=axes @ np.diag(moments) @ axes.T))
+    return robot.with_bodies(bodies)
+
+
+@hypothesis(
+    {"mujoco": "3.8.1 to 3.10.0"}, 'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file'
+)
+def merged_inertial_misplaced(evidence: RobotEvidence) -> Robot:
+    """The inertial of a merged link is placed in the wrong order (default fusestatic for URDF).
+
+    The pose (p, R) of the link in its parent and the pose (c, Q) of its principal frame in the link are multiplied as
+    (c, Q) (p, R): the centre of mass comes to lie at c + Q p instead of p + R c. The principal frame is MuJoCo's:
+    Jacobi rotations from the axes of the link, then moments in descending order; its rpy is ignored, as in these
+    versions.
+    """
+    return _misplaced(evidence, turned=True)
+
+
+@hypothesis({"mujoco": "3.3.3"}, 'update MuJoCo, or put <mujoco><compiler fusestatic="false"/></mujoco> into the file')
+def merged_inertial_misplaced_unturned(evidence: RobotEvidence) -> Robot:
+    """The inertial of a merged link is placed in the wrong order and not turned (default fusestatic for URDF)."""
+    return _misplaced(evidence, turned=False)
+
+
+def _half(kind: str, sizes: dict[str, str]) -> Array | None:
+    """Half lengths of a shape's bounding box [m], shape (3,); None: the kind of shape is not covered."""
+    name, count, part = {"box": ("size", 3, 0.5), "sphere": ("radius", 1, 1.0)}.get(kind, ("", 0, 0.0))
+    try:
+        lengths = [part * float(length) for length in sizes.get(name, "").split()]
+    except ValueError:
+        return None
+    return np.full(3, lengths) if count and len(lengths) == count else None
+
+
+def _box(mass: float, shapes: list[Any], com: Array, frame: Array) -> Array | None:
+    """Principal moments of the box around all shapes, in the inertial's axes [kg m²], shape (3,).
+
+    None: a shape is not covered.
+    """
+    low, high = (np.full(3, np.inf), np.full(3, -np.inf)) if shapes else (np.zeros(3), np.zeros(3))
+    for kind, sizes, position, rotation in shapes:
+        half = _half(kind, sizes)
+        if half is None:
+            return None
+        centre, reach = frame.T @ (position - com), np.abs(frame.T @ rotation) @ half
+        reach = reach if kind == "box" else half
+        low, high = np.minimum(low, centre - reach), np.maximum(high, centre + reach)
+    x, y, z = (high - low + 2 * _MARGIN) ** 2
+    return mass / 12 * np.array([y + z, x + z, x + y])
+
+
+@hypothesis({"pybullet": "default of 3.2.7"}, "load with flags=URDF_USE_INERTIA_FROM_FILE")
+def inertia_from_collision(evidence: RobotEvidence) -> Robot | None:
+    """Inertias are computed from collision shapes, not taken from the file.
+
+    Inertias are those of a box around the shapes, in the axes of the file's inertial.
+    """
+    robot, bodies = evidence.robot, []
+    for name, source in robot.sources.items():
+        body = robot.bodies.get(name)
+        if body is None or not source.get("inertial") or not body.mass:
+            continue
+        moments = _box(body.mass, source["shapes"], body.com, source["frame"])
+        if moments is None:
+            return None
+        frame = source["frame"]
+        bodies.append(dataclasses.replace(body, inertia=frame @ np.diag(moments) @ frame.T))
+    return robot.with_bodies(bodies)
+
+
+@hypothesis({"pinocchio": "4.1.0"}, WRITE_INERTIALS)
+def noncolliding_shapes_weightless(evidence: RobotEvidence) -> Robot | None:
+    """Shapes that collide with nothing (contype 0, conaffinity 0) give no mass."""
+    sources = evidence.robot.sources
+
+    def edit(root: Element) -> bool:
+        touched = False
+        for body in root.iter("body"):
+            shapes = body.findall("geom")
+            collides = sources.get(str(body.get("name")), {}).get("collides", [])
+            if len(shapes) != len(collides) or all(collides):
+                continue
+            touched = True
+            for shape, hits in zip(shapes, collides, strict=True):
+                if not hits:
+                    body.remove(shape)
+        bounded_from_below(root, replace=False)
+        return touched
+
+    return evidence.edited(edit)
+
+
+_DENSITY = 1000.0
+
+
+def _solid(kind: str, sizes: Mapping[str, str]) -> tuple[float, Array] | None:
+    """Mass [kg] and principal moments [kg m²] of a shape at 1000 kg/m³; None: the kind of shape is not covered."""
+    if kind == "box":
+        x, y, z = (float(part) for part in sizes["size"].split())
+        m = _DENSITY * x * y * z
+        return m, m / 12 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+    if kind == "sphere":
+        r = float(sizes["radius"])
+        m = _DENSITY * 4 / 3 * math.pi * r**3
+        return m, np.full(3, 0.4 * m * r * r)
+    if kind == "cylinder":
+        r, length = float(sizes["radius"]), float(sizes["length"])
+        m = _DENSITY * math.pi * r * r * length
+        across = m * (r * r / 4 + length * length / 12)
+        return m, np.array([across, across, m * r * r / 2])
+    return None
+
+
+def _weighed(name: str, shapes: list[Any]) -> RobotBody | None:
+    parts = []
+    for kind, sizes, position, rotation in shapes:
+        solid = _solid(kind, sizes)
+        if solid is None:
+            return None
+        mass, moments = solid
+        parts.append((RobotBody("", mass, np.zeros(3), np.diag(moments)), np.array(position), np.array(rotation)))
+    return composed(name, parts) if parts else None
+
+
+@hypothesis({"mujoco": "all versions so far"}, "give every link an <inertial>")
+def shapes_weighed(evidence: RobotEvidence) -> Robot:
+    """Collision shapes of links without <inertial> are weighed at 1000 kg/m³."""
+    robot = evidence.robot
+    bare = {name: source["shapes"] for name, source in robot.sources.items() if not source.get("inertial", True)}
+    return robot.with_bodies(filter(None, itertools.starmap(_weighed, bare.items())))
+
+
+@hypothesis({"pybullet": "3.2.7"}, "give every link an <inertial>; a massless one with mass 0 and inertia 0")
+def unit_mass_without_inertial(evidence: RobotEvidence) -> Robot:
+    """Links without <inertial> are given 1 kg and unit inertia."""
+    robot = evidence.robot
+    bare = (name for name, source in robot.sources.items() if name in robot.bodies and not source.get("inertial", True))
+    return robot.with_bodies(RobotBody(name, 1.0, np.zeros(3), np.eye(3)) for name in bare)

@@ -178,8 +178,8 @@ def judge(
             as ``q.hinge``, ``tip.x``, ``positions``, ``z``; in the truth's units.
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
         tolerance: observable or variable -> ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit; or texts as
-            of ``--tolerance``, of which one without a name bounds the main motion and the place of every body, or what
-            a table gives, in its unit. A single number is for the deciding observable. None: 1 % of each main quantity,
+            of ``--tolerance``; one without a name bounds the main motion and the place of every body, or all that a
+            table gives, in its unit. A single number is for the deciding observable. None: 1 % of each main quantity,
             of every force and moment, and of given positions, velocities, angular velocities and orientations; for the
             time of the first slip the sampling interval. A run that reports sticking while it slips never agrees.
         because: reason for these tolerances.

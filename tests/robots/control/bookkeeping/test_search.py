@@ -14,8 +14,8 @@ from outside_records import CONTROL, MISTAKES, PROGRAMS, SERVOS, Loop, urdf
 from proofroll.elements.mechanism import Mechanism
 from proofroll.robots.control.bookkeeping.air import AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.bookkeeping.screen import SeenMotion
 from proofroll.robots.control.bookkeeping.search import MotionSearch
-from proofroll.robots.control.bookkeeping.seen import SeenMotion
 from proofroll.robots.control.controlled import ControlledScenes
 
 EVERY = {1e-3: 4, 2e-3: 2, 5e-3: 1}  # steps between samples
@@ -41,6 +41,8 @@ def _found(program: str, step: float, **mistake: object) -> MotionSearch:
     return MotionSearch(mechanism, law, SeenMotion(record["time"][::every, 0], q, v), [step])
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("program", [*PROGRAMS, *SERVOS])
 @pytest.mark.parametrize("step", [*(pytest.param(step, marks=pytest.mark.drill) for step in (1e-3, 2e-3)), 5e-3])
 def test_a_right_loop_is_accused_of_nothing(program: str, step: float) -> None:
@@ -50,7 +52,8 @@ def test_a_right_loop_is_accused_of_nothing(program: str, step: float) -> None:
     assert found.before < 1e-9
 
 
-@pytest.mark.drill
+@pytest.mark.one_in(4)
+@pytest.mark.nightly
 @pytest.mark.nightly_of(
     "mujoco-0.002-velocity in the base",
     "pinocchio-0.001-gravity 9.80",

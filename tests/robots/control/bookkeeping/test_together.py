@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from proofroll.robots.control.bookkeeping.mistakes import Mistake, SearchTime
-from proofroll.robots.control.bookkeeping.together import LayerTrials, mistakes_together
+from proofroll.robots.control.bookkeeping.search import LayerTrials, mistakes_together
 
 # Columns: a law is a tuple of their numbers, and the record has these.
 RECORDED = (3.0, -1.0, 5.0)

@@ -63,6 +63,7 @@ def ball_scenes() -> Iterator[str]:
     return (name for name in scene_names() if type(load_scene(name).elements[0]).__name__ == "BallOnSurface")
 
 
+@pytest.mark.drill
 def test_every_scene_of_a_ball_starts_as_a_body_where_the_ball_does() -> None:
     """Centre, velocity, spin and gravity of a body are those of the ball; its element has the ball's name."""
     for name in ball_scenes():

@@ -55,6 +55,7 @@ def test_a_wrong_bushing_gets_one_line(tmp_path: Path, lines: str, words: str) -
     assert words in refusal(tmp_path, "free", mount + lines)
 
 
+@pytest.mark.drill
 def test_a_bushing_about_a_principal_axis_is_a_torsion_spring() -> None:
     """About one axis the moment is k times the angle, up to 2 rad: with a damper the oscillator of the textbook."""
     k, c, inertia, angle = 3.0, 0.1, ROUND[2][2], 2.0
@@ -69,6 +70,7 @@ def test_a_bushing_about_a_principal_axis_is_a_torsion_spring() -> None:
     assert np.max(np.abs(found[:, 2] - exact)) < 1e-12
 
 
+@pytest.mark.drill
 def test_two_bodies_on_a_bushing_keep_energy_and_momentum() -> None:
     """An undamped bushing between free bodies keeps energy, momentum and moment of momentum in both routes."""
     bodies = (Body("a", 2.0, (0.1, 0, 0.05), ROUND), Body("b", 1.5, (0, 0.1, 0), ROUND))
@@ -85,7 +87,7 @@ def test_two_bodies_on_a_bushing_keep_energy_and_momentum() -> None:
         assert np.max(np.abs(part - part[0])) < 1e-12
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_independent_solver_agrees() -> None:
     """Newton's and Euler's equations with differences of the energy of the rotation vector give the same motion."""
     k, c = np.array([20.0, 30, 40, 2, 3, 5]), np.array([1.0, 2, 3, 0.1, 0.2, 0.3])

@@ -58,6 +58,7 @@ def slack_and_taut() -> tuple[float, float, float]:
     return float(swing.t[-1]), float(swing.t[-1]) + flight, along**2 / 2 + G * float(end[1])
 
 
+@pytest.mark.drill
 def test_a_pendulum_on_a_cable_goes_slack(tmp_path: Path) -> None:
     """It leaves the circle where the tension ends, flies on a parabola, and loses its speed along the cable."""
     element = MechanismElement(one_body(tmp_path, "free", SWING))
@@ -72,6 +73,7 @@ def test_a_pendulum_on_a_cable_goes_slack(tmp_path: Path) -> None:
     assert content["force.k.z"].to_numpy()[0] == pytest.approx(SPEED**2 + G, abs=1e-11)
 
 
+@pytest.mark.nightly
 def test_a_mass_is_caught_and_thrown_back(tmp_path: Path) -> None:
     """A mass that falls into a cable comes back with its restitution, and hangs by its weight in the end."""
     fall, restitution = 0.5, 0.4
@@ -87,6 +89,7 @@ def test_a_mass_is_caught_and_thrown_back(tmp_path: Path) -> None:
     assert content["p_WB"].to_numpy()[-1, 0, 2] == pytest.approx(-fall, abs=1e-12)
 
 
+@pytest.mark.drill
 def test_a_cable_between_bodies_keeps_momentum() -> None:
     """Two bodies that part go on together where a cable between them goes taut, along its line."""
     bodies = tuple(
@@ -105,6 +108,7 @@ def test_a_cable_between_bodies_keeps_momentum() -> None:
     assert speeds == pytest.approx([0.5 + 0.75, 0.5 - 0.25], abs=1e-12)  # they part at -1 m/s, of 2 m/s before
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("engine", "slack_after", "reason"),

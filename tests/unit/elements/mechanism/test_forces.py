@@ -91,6 +91,7 @@ def test_a_force_off_the_centre_turns_the_body() -> None:
     assert placed.w_WB[:, 0, 0] == pytest.approx(0.5 * 2.0 / 0.1 * TIMES, abs=1e-12)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("kind", "frame"), [("force", "world"), ("force", "body"), ("moment", "body")])
 def test_a_reaction_keeps_momentum(kind: Any, frame: Any) -> None:
     """A force with its reaction changes neither momentum nor moment of momentum, whatever the bodies do."""
@@ -114,6 +115,7 @@ def sliding(push: tuple[Any, ...]) -> Mechanism:
     return Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,), forces=(Force("f", "b", "force", push),))
 
 
+@pytest.mark.drill
 def test_a_pushed_body_slides_with_friction_of_its_load() -> None:
     """A push down adds to the normal force and so to friction: both routes of contact apply the force."""
     placed, bar = moved(sliding((5.0, 0.0, -4.0)))
@@ -122,6 +124,7 @@ def test_a_pushed_body_slides_with_friction_of_its_load() -> None:
     assert placed.p_WB[:, 0, 0] == pytest.approx(TIMES + a * TIMES**2 / 2, abs=1e-8)
 
 
+@pytest.mark.drill
 def test_a_push_that_grows_finds_static_and_then_kinetic_friction() -> None:
     """At rest a ball rolls until static friction is at its bound; from there kinetic friction acts against the push.
 

@@ -49,6 +49,7 @@ def sprung(folder: Path, kind: str, laws: str, q: Rotation, spin: np.ndarray, pl
     return one_body(folder, kind, f"orientation = [{roll}, {pitch}, {yaw}]\nq0 = {q0}\nv0 = {v0}\n{laws}")
 
 
+@pytest.mark.drill
 def test_a_round_body_swings_about_one_axis(tmp_path: Path) -> None:
     """From where its spring is at rest a round body of a ball joint swings about its axis of spin, with decay."""
     rest = Rotation.from_rotvec([0.2, 0.3, -0.1])
@@ -63,6 +64,7 @@ def test_a_round_body_swings_about_one_axis(tmp_path: Path) -> None:
     assert np.abs(truth["bushing_torques"].values[:, 0] - moment).max() < 1e-12
 
 
+@pytest.mark.drill
 def test_a_symmetrical_top_on_a_spring_spins_on(tmp_path: Path) -> None:
     """A round body that spins about the axis of its turn keeps its energy, ½ k θ² + ½ I w², and its plane of motion."""
     start = Rotation.from_rotvec(0.7 * AXIS)
@@ -81,6 +83,8 @@ def test_a_symmetrical_top_on_a_spring_spins_on(tmp_path: Path) -> None:
     assert np.abs(energy - energy[0]).max() < 1e-12
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "engine",
     [

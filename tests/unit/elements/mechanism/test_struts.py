@@ -66,6 +66,7 @@ def test_another_loop_has_no_length() -> None:
         Loop("l", "spherical", "world", "b", length=1.0)
 
 
+@pytest.mark.drill
 def test_a_body_on_a_strut_is_a_pendulum() -> None:
     """The centre of mass on a strut moves as a mathematical pendulum, with its tension, while the body tumbles."""
     mechanism, times = hung(), np.linspace(0.0, 1.0, 6)
@@ -82,6 +83,7 @@ def test_a_body_on_a_strut_is_a_pendulum() -> None:
     assert on_body == pytest.approx(-tension[-1] * places[-1] / 1.25, abs=1e-8)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("formulation", list(runs.FORMULATIONS))
 def test_every_engine_holds_a_strut_or_refuses(formulation: str) -> None:
     """Motion and force of a strut in each engine are the truth's; or the engine refuses it."""

@@ -73,6 +73,8 @@ def read(folder: Path, tables: Mapping[str, Any]) -> Scene:
     return load_scene(str(folder))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_scene_is_valid(family: str, tmp_path: Path) -> None:
     """The reader accepts every scene, and it has the capability of each feature that it was drawn with."""
@@ -100,6 +102,7 @@ def test_a_seed_decides_the_scene(family: str) -> None:
     assert all(one != two for one, two in pairwise(scenes))
 
 
+@pytest.mark.drill
 def test_each_capability_is_drawn_or_excused(tmp_path: Path) -> None:
     """A scene asked for a capability needs it from an engine; those that none is asked for have a reason."""
     features = {name: family for family, item in FAMILIES.items() for name in item.features}
@@ -117,6 +120,7 @@ def test_a_shape_is_asked_of_an_engine(shape: str, tmp_path: Path) -> None:
     assert SHAPES[shape] in read(tmp_path / shape, tables).requires
 
 
+@pytest.mark.drill
 def test_each_key_is_drawn_or_excused() -> None:
     """Every key of the vocabulary is in some scene, or has a reason why not; no reason is stale."""
     vocabulary = {
@@ -134,6 +138,7 @@ def test_each_key_is_drawn_or_excused() -> None:
     assert vocabulary - drawn == NOT_DRAWN.keys()
 
 
+@pytest.mark.drill
 def test_pairs_of_features_are_drawn_evenly() -> None:
     """Consecutive seeds of a family ask for every pair of its features before any pair comes again."""
     family = FAMILIES["contact"]

@@ -44,6 +44,8 @@ def is_valid(folder: Path, tables: Mapping[str, Any]) -> bool:
     return True
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("loop")
 @pytest.mark.parametrize("family", FAMILIES)
 def test_changes_apply_or_are_refused_in_words(family: str, tmp_path: Path) -> None:
@@ -56,6 +58,8 @@ def test_changes_apply_or_are_refused_in_words(family: str, tmp_path: Path) -> N
     assert sum(accepted) > len(accepted) / 2
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("family", "seed"), [("loop", 0), ("contact", 2), ("contact", 5)])
 def test_rounded_lengths_fit_again(family: str, seed: int, tmp_path: Path) -> None:
     """Rounding opens a loop without dependent joints, or presses bodies together; closing makes it valid."""
@@ -93,6 +97,7 @@ def test_numbers_of_formulas_are_rounded() -> None:
     assert rounded(True, 1) is True
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_turned_scene_is_valid_and_turns_all_bodies_alike(family: str, tmp_path: Path) -> None:
     """Every body of a turned scene is turned and shifted by the same amount."""

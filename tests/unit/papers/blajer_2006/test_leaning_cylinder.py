@@ -9,6 +9,8 @@ from true_runs import true_run
 from proofroll.running.simulation import simulate
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("engine", "resistance", "error"),
     [

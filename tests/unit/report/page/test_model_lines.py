@@ -42,7 +42,7 @@ def test_the_engines_own_lines_are_those_of_its_adapter() -> None:
     assert "alpha" in unknown.note
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_each_line_was_run(proofroll: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     """The command says yes, and the test passes, of the setting and the question that they were made from."""
     from proofroll.running.idle_workers import Workers

@@ -14,7 +14,7 @@ from proofroll.report.run.replay import replay_page, run_page
 from proofroll.running.simulation import simulate
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_nothing_is_drawn_behind_the_end_of_a_truth() -> None:
     """The page of a run whose truth ends early draws both up to there, and says when and why."""
     bouncing = {"restitution": 0.5, "tangential_restitution": 1.0, "mu_static": math.inf, "mu_kinetic": math.inf}

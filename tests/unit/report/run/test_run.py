@@ -189,6 +189,7 @@ def test_a_body_without_tracked_points_is_shown_where_it_is(tracked: bool, tmp_p
     assert tracked or (content.error_bars or {})["box.z"] == 1e-9
 
 
+@pytest.mark.drill
 def test_bounces_stand_in_the_table_and_in_the_file_of_events(tmp_path: Path) -> None:
     """Each impact has its energies and the next apex in the document, on the terminal and in a CSV of all events."""
     write(simulate(load_scene("spinning_bounce"), "truth", until=1.0), tmp_path / "run.npz")

@@ -17,7 +17,7 @@ def asked(out: Path, engine: str, *more: str) -> list[str]:
     return [*given, *(more or ("--tolerance", "1 mm"))]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_step_is_good_enough_or_is_not(proofroll: Proofroll, tmp_path: Path) -> None:
     """Yes with the error of what is allowed and twice the step; no with the step that it needs at best."""
     engine = "mujoco[formulation=joints,preset=matched,dt={}]"
@@ -37,6 +37,7 @@ def test_a_step_is_good_enough_or_is_not(proofroll: Proofroll, tmp_path: Path) -
     assert "; at best it needs dt " in " ".join(out.split())
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("engine", "tolerance", "words"),

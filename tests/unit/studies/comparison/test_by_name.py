@@ -11,7 +11,7 @@ import pytest
 import proofroll
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_notebook_shows_a_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A scene is compared at given parameters, and its outcome is a table with a row for each run."""
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison.engine_names", lambda: ["projection"])

@@ -112,6 +112,8 @@ def off(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(z=dataset["z"] + 1e-3)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("angle", "agrees"), [(0.0, True), (1e-4, True), (0.1, False)])
 def test_the_orientation_of_a_ball_is_judged(tmp_path: Path, angle: float, agrees: bool) -> None:
     """A ball that is right but for its orientation differs; a quaternion's sign, any at each sample, says nothing."""
@@ -131,6 +133,7 @@ def test_the_orientation_of_a_ball_is_judged(tmp_path: Path, angle: float, agree
     }
 
 
+@pytest.mark.drill
 def test_a_claim_that_holds(tmp_path: Path) -> None:
     """An engine that gives the truth contradicts nothing, and one that is off contradicts once, by its observable."""
     assert judged(tmp_path / "right", claim([ROW], [4.0]), the_truth).contradictions == []
@@ -138,6 +141,7 @@ def test_a_claim_that_holds(tmp_path: Path) -> None:
     assert said.startswith("alpha at speed=4 differs, expected: agrees (z differs; z: error 1e-3 m beyond 1e-9 m")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("row", "bounds"),
     [
@@ -188,6 +192,7 @@ def higher(metres: float) -> Answer:
     return lambda _, dataset: dataset.assign(z=dataset["z"] + metres)
 
 
+@pytest.mark.drill
 def test_a_run_is_judged_by_its_own_ladder(tmp_path: Path) -> None:
     """An engine that hits the truth at one step only differs; where a finer step gave nothing, nothing is confirmed."""
     row = dataclasses.replace(ROW, ladder=[1.0, 0.5, 0.25])
@@ -214,6 +219,7 @@ def test_a_tolerance_that_the_engine_refuses_is_no_rung(tmp_path: Path) -> None:
     assert len(run.rungs) == 1
 
 
+@pytest.mark.drill
 def test_the_error_of_a_rung_is_that_between_its_samples_too(tmp_path: Path) -> None:
     """A coarser run that is right in its samples and a millimetre off between them has that error in the ladder."""
 
@@ -230,6 +236,7 @@ def silent(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
     return dataset.drop_vars(["N", "F2", "F3", "needed_friction"])
 
 
+@pytest.mark.drill
 def test_a_silent_engine_does_not_plainly_agree(tmp_path: Path) -> None:
     """Without forces that the tolerances judge a run is incomplete, and contradicts unless that is expected."""
     bounds = TIGHT | {"N": Tolerance(1e-6, False, "N")}
@@ -249,6 +256,7 @@ def test_a_silent_engine_does_not_plainly_agree(tmp_path: Path) -> None:
     assert full.contradictions[0].startswith("alpha at speed=4 agrees, expected: incomplete")
 
 
+@pytest.mark.drill
 def test_who_shares_a_route_with_the_truth_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run of an engine that declares the truth's own equations is marked; one of an engine that does not is not."""
     (run,) = judged(tmp_path / "other", claim([ROW], [4.0]), the_truth).runs
@@ -258,6 +266,8 @@ def test_who_shares_a_route_with_the_truth_is_marked(tmp_path: Path, monkeypatch
     assert run.shared.startswith("rests on the same equations as the truth itself (closed form")
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("expect", [Verdict.AGREES, Verdict.CONVERGES, Verdict.DIFFERS])
 def test_a_tolerance_below_the_truth_contradicts_nobody(tmp_path: Path, expect: Verdict) -> None:
     """Where the truth is known less well than the tolerance no run agrees, and none contradicts, right or wrong."""
@@ -276,6 +286,7 @@ def test_what_cannot_be_judged_hides_nothing(tmp_path: Path) -> None:
     assert run.contradictions[0].startswith("alpha at speed=4 differs, expected: agrees (z differs")
 
 
+@pytest.mark.drill
 def test_another_scene_is_shown_and_not_judged(tmp_path: Path) -> None:
     """A friction of 1 where the unbounded scene needs 1.08 is no verdict, and contradicts only who says it agrees."""
     number = Line("inverse friction", "1", (0.0,), (1.0,), 1.0, 1.0, "the engine needs a number")
@@ -302,6 +313,7 @@ def test_exceptions_decide(tmp_path: Path) -> None:
     assert [said.partition(" (")[0] for said in wrong.contradictions] == ["alpha at speed=3 differs, expected: agrees"]
 
 
+@pytest.mark.drill
 def test_an_exception_may_expect_a_failure(tmp_path: Path) -> None:
     """A run that is expected to fail is neither lost nor a contradiction; the same elsewhere is both."""
 
@@ -315,6 +327,8 @@ def test_an_exception_may_expect_a_failure(tmp_path: Path) -> None:
     assert [run.verdict for run in outcome.runs] == [Verdict.FAILED] * 2
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("status", "verdict"), [(Status.REFUSED, Verdict.REFUSED), (Status.WRONG_MODEL, Verdict.FAILED)]
 )
@@ -334,6 +348,8 @@ def test_a_refusal_is_no_failure(tmp_path: Path, status: Status, verdict: Verdic
         assert exit_code([outcome]) == (0 if expected is verdict else 1)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("status", [Status.DIVERGED, Status.WRONG_MODEL, Status.CRASHED, Status.REFUSED])
 @pytest.mark.parametrize("true", [True, False])
 def test_a_failure_counts_where_nothing_is_claimed(tmp_path: Path, status: Status, true: bool) -> None:
@@ -351,6 +367,8 @@ def test_a_failure_counts_where_nothing_is_claimed(tmp_path: Path, status: Statu
     assert exit_code([beside]) == (0 if status is Status.REFUSED else 3)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("witness", "engine", "code"), [(True, True, 0), (True, False, 3), (False, True, 3)])
 def test_a_witness_that_fails_fails_no_comparison(tmp_path: Path, witness: bool, engine: bool, code: int) -> None:
     """What cross-checks the truth, and fails, costs an exit code only where nothing else is compared."""
@@ -364,6 +382,7 @@ def test_a_witness_that_fails_fails_no_comparison(tmp_path: Path, witness: bool,
     assert exit_code([outcome]) == code
 
 
+@pytest.mark.drill
 def test_reactions_without_a_tolerance_are_named(tmp_path: Path) -> None:
     """A first look says which forces and moments it does not judge; a comparison file states what it judges."""
     free = dataclasses.replace(ROW, tolerance="fall", expect=list(Verdict))
@@ -375,6 +394,7 @@ def test_reactions_without_a_tolerance_are_named(tmp_path: Path) -> None:
     assert outcome_content(claimed).unjudged == []
 
 
+@pytest.mark.drill
 def test_a_time_that_is_cut_before_anything_touches_is_no_success(tmp_path: Path) -> None:
     """Bodies that fall and touch nothing in what is left of the time: said, and exit 3; whole, or touched: exit 0."""
     free = dataclasses.replace(ROW, tolerance="fall", expect=list(Verdict))
@@ -431,6 +451,7 @@ def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) ->
     assert (run.verdict, run.contradictions) == (Verdict.ILL_POSED, [])
 
 
+@pytest.mark.drill
 @pytest.mark.nightly_of("0.0001")
 @pytest.mark.parametrize("tolerance", [1e-4, 2e-3])
 def test_events_that_are_late_alike_in_every_run_are_no_other_limit(tmp_path: Path, tolerance: float) -> None:
@@ -491,6 +512,7 @@ def test_neighbouring_points_have_truths_of_their_own(
     assert 1e-6 / 0.2 * comparison.until > TIGHT["gamma"].absolute(1.0)
 
 
+@pytest.mark.drill
 def test_a_point_where_the_truth_refuses(tmp_path: Path) -> None:
     """Where the truth refuses nobody is judged, with its reason; an engine that failed there failed all the same."""
     rows = [ROW, dataclasses.replace(ROW, engine="beta")]
@@ -508,6 +530,7 @@ def test_a_point_where_the_truth_refuses(tmp_path: Path) -> None:
     assert content.runs[1].reason.startswith("no truth at speed=4: the ball")
 
 
+@pytest.mark.drill
 def test_where_no_motion_is_unique_tolerances_of_motion_judge_nobody(tmp_path: Path) -> None:
     """Where the truth knows laws alone, a row whose tolerances name no law is not judged, for that reason."""
     bounds = {"positions": Tolerance(1e-3, False, "m")}
@@ -522,6 +545,8 @@ def test_where_no_motion_is_unique_tolerances_of_motion_judge_nobody(tmp_path: P
     assert "no motion is unique here, and no law has a tolerance: " in outcome.runs[0].result.message
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("status", "clause"), [(Status.CRASHED, "the truth ended in an error"), (Status.TIMEOUT, "the truth took too long")]
 )
@@ -603,6 +628,8 @@ LEFT_OUT = Result(Status.LEFT_OUT, "the 60 s of processor time did not suffice")
 EXPECTED = {"agrees": [Verdict.AGREES], "converges": [Verdict.CONVERGES], "failed": [Verdict.FAILED]}
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("given", "said"),
     [

@@ -16,6 +16,7 @@ from proofroll.studies.comparison import planning
 from proofroll.studies.comparison.default_comparison import able
 
 
+@pytest.mark.drill
 def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """A setting that does not exist is told with file and row, before the truth looks for the edge of a stair."""
 
@@ -46,6 +47,8 @@ def test_the_truth_gives_all_that_can_be_asked_for() -> None:
     assert {case.asks for run in found.runs for case in run.ladder.values()} == {()}
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("step", "factors"), [(2.5e-4, [4.0, 2.0, 1.0]), (1e-3, [2.0, 1.0, 0.5]), (2e-3, [1.0, 0.5, 0.25])]
 )
@@ -64,6 +67,7 @@ def test_a_comparison_without_motion_is_refused() -> None:
         first_look.default_comparison("pendulum", {}, until=0.0)
 
 
+@pytest.mark.drill
 def test_a_first_look_takes_the_step_that_a_scene_asks_for() -> None:
     """Engines with a fixed step have that of the scene's file where their own is longer; adaptive ones have theirs."""
     engines = [row.engine for row in first_look.default_comparison("andrews_squeezer", {}).rows]

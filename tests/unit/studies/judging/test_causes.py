@@ -115,6 +115,7 @@ def test_a_clock_at_another_rate_is_named(rate: float) -> None:
     assert said(one_at(rate * TIMES), TWO) == []
 
 
+@pytest.mark.nightly
 def test_a_state_at_half_its_times_is_no_other_gravity() -> None:
     """A whole state whose times are halved has its clock as its cause, where the balance of momentum doubles, too."""
     scene = load_scene("pendulum")
@@ -126,6 +127,7 @@ def test_a_state_at_half_its_times_is_no_other_gravity() -> None:
     assert "gravity" not in str(judged)
 
 
+@pytest.mark.drill
 def test_a_late_record_of_a_motion_that_jumps_is_named() -> None:
     """Its places tell the delay, and no start that was not taken is told beside it."""
     scene = load_scene("two_spheres")
@@ -137,6 +139,8 @@ def test_a_late_record_of_a_motion_that_jumps_is_named() -> None:
     assert only.startswith("the record is late by 0.1 s (")
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("whole", [True, False])
 @pytest.mark.parametrize("clock", [True, False])
 def test_a_late_record_is_named(*, whole: bool, clock: bool) -> None:
@@ -153,7 +157,7 @@ def test_a_late_record_is_named(*, whole: bool, clock: bool) -> None:
     assert "cause: the record is late by 0.1 s (" in str(judged)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_clock_that_begins_later_is_no_delay_less_some_periods() -> None:
     """The first row of a swing that comes back is the scene's start, wherever its clock begins."""
     scene = load_scene("pendulum", angle=0.5)
@@ -187,6 +191,8 @@ def falling() -> Scene:
     return Scene("fall", "", (MechanismElement(made),))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("kept", [0.96, 1.0])
 def test_damping_of_a_free_body_is_named(kept: float) -> None:
     """Steps of 1/240 s that keep 96 % of the velocity in a second; without, their first-order error is no damping."""

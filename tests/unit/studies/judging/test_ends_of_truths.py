@@ -59,6 +59,7 @@ def falling() -> dict[str, np.ndarray]:
     return {"time": time, "p_WB": p_WB}
 
 
+@pytest.mark.drill
 def test_a_truth_has_no_sample_behind_its_end(disc: str) -> None:
     """All samples before the end have their values, none lies behind it, and the message says when and why."""
     found = proofroll.simulate(disc, until=0.3, every=0.01)
@@ -79,6 +80,7 @@ def test_a_run_is_judged_up_to_the_end_of_the_truth(disc: str) -> None:
     assert not proofroll.judge(run, disc, {"p_WB": "1e-9 m"}).agrees
 
 
+@pytest.mark.nightly
 def test_a_run_of_the_truth_that_lacks_samples_says_so(
     command_line: Callable[..., tuple[int, str, str]], disc: str
 ) -> None:

@@ -84,7 +84,7 @@ def test_a_force_is_judged_where_the_truth_determines_it() -> None:
     assert not proofroll.judge(run, "falling_rod").agrees
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_sled_whose_friction_is_thrice_and_reversed_differs() -> None:
     """Forces are judged up to the rest in which three feet share them, also where a motion alone has a tolerance."""
     run = proofroll.simulate("sled", "projection", until=0.7, every=0.02).copy(deep=True)
@@ -96,6 +96,7 @@ def test_a_sled_whose_friction_is_thrice_and_reversed_differs() -> None:
         assert next(item.judgement.observable for item in found.compared if not item.agrees) == "contact_forces"
 
 
+@pytest.mark.drill
 def test_a_given_force_is_judged_where_the_truth_determines_it() -> None:
     """A column of a person's own, which a truth has at some times only, is judged at these."""
     run = proofroll.simulate("falling_rod", until=0.1, every=0.01)
@@ -105,6 +106,7 @@ def test_a_given_force_is_judged_where_the_truth_determines_it() -> None:
     assert proofroll.judge(own, "falling_rod").agrees
 
 
+@pytest.mark.drill
 def test_a_sample_on_a_bounce_may_be_of_either_side() -> None:
     """Velocities of a ball on a wall have two values there, too; one far from both is wrong."""
     scene = proofroll.load_scene("bouncing_ball", height=0.1, restitution=0.5)
@@ -118,6 +120,7 @@ def test_a_sample_on_a_bounce_may_be_of_either_side() -> None:
         assert proofroll.judge(run, scene, {"v_WB": "1e-6 m/s"}, because="round-off").agrees is agrees
 
 
+@pytest.mark.drill
 def test_a_number_that_is_not_finite_is_named_with_its_time() -> None:
     """Of a coordinate without a number at 0.2 s and behind, the line names the first time."""
     run = proofroll.simulate("pendulum", "projection", until=0.4, every=0.1)

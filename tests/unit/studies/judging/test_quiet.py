@@ -12,6 +12,8 @@ from proofroll.files.scene_file import load_scene
 from proofroll.studies.judging.quiet import quiet
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "parameters", "until", "words"),
     [

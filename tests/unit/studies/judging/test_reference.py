@@ -176,6 +176,7 @@ def against(formulation: str, **parameters: float) -> str:
     return held.shared(resolve("reduced", {"formulation": formulation})["shares"])
 
 
+@pytest.mark.drill
 def test_who_rests_on_a_route_of_the_truth_is_told() -> None:
     """The least model shares the route that the truth takes in this case, or not, and the other route is named."""
     said = against("equations", rolling_resistance=5e-4)
@@ -201,6 +202,7 @@ def test_routes_are_declared_for_formulations_that_there_are() -> None:
     assert resolve("projection", {})["shares"] == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("until", [1e-3, 2e-2])
 def test_a_percentage_of_event_times_is_one_of_the_time_of_the_run(until: float) -> None:
     """Times of events have the size of the time that a truth spans, in a scene of milliseconds as in one of hours."""

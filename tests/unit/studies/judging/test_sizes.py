@@ -26,6 +26,7 @@ def pendulum(at_hinge: bool) -> Scene:
     return Scene("rod", "", (MechanismElement(Mechanism((body,), (joint,), gravity=(0, -9.81, 0))),))
 
 
+@pytest.mark.drill
 def test_sizes_hang_on_no_frame() -> None:
     """A frame in the hinge stands still; speeds and ways have the size that they have with one elsewhere."""
     sizes = [Reference.of(scene, truth(scene, TIMES)).sizes for scene in map(pendulum, (True, False))]
@@ -49,6 +50,7 @@ def test_a_steady_velocity_has_its_own_size(faster: float, agrees: bool) -> None
     assert found.agrees is agrees, str(found)
 
 
+@pytest.mark.drill
 def test_a_verdict_does_not_turn_with_the_axes() -> None:
     """An error of 0.8 % of the speed in each of three axes is more than 1 %, as in axes in which it lies along one."""
     scene = pendulum(False)

@@ -53,6 +53,7 @@ def test_a_header_that_promises_more_numbers_than_follow(tmp_path: Path) -> None
         proofroll.judge(run, "pendulum")
 
 
+@pytest.mark.drill
 def test_numbers_of_more_digits_are_judged(tmp_path: Path) -> None:
     """A file of longdouble has the verdict of the same numbers as float64."""
     angles = np.full(11, 2.8)
@@ -107,6 +108,7 @@ def test_more_samples_than_a_run_may_have_are_not_unpacked(tmp_path: Path, monke
         proofroll.judge(tmp_path / "run.npz", "pendulum")
 
 
+@pytest.mark.drill
 @pytest.mark.filterwarnings("error")
 def test_times_of_half_precision_and_columns_of_another_shape_are_told_apart() -> None:
     """Times as float16 are read without a warning; a table of times, and a quantity of another shape, are named."""
@@ -132,6 +134,7 @@ def pendulum() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return run["time"].to_numpy(), run["q.pivot"].to_numpy(), run["tip.x"].to_numpy()
 
 
+@pytest.mark.drill
 def test_columns_of_any_name_and_unit(
     pendulum: tuple[np.ndarray, np.ndarray, np.ndarray],
     command_line: Callable[..., tuple[int, str, str]],
@@ -174,6 +177,8 @@ def test_arrays_are_renamed_and_converted(pendulum: tuple[np.ndarray, np.ndarray
         proofroll.judge(arrays, "pendulum", columns={"phi": "q.pivot"})
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("own", [True, False], ids=["of a run", "of a file"])
 @pytest.mark.parametrize("column", ["q.pivot", "v.pivot", "tip.x", "positions"])
 def test_a_column_that_contradicts_the_state_is_named(column: str, *, own: bool) -> None:
@@ -191,6 +196,7 @@ def test_a_column_that_contradicts_the_state_is_named(column: str, *, own: bool)
     assert ("against the state of the same trajectory" in str(wrong)) is (column != "positions" or not own)
 
 
+@pytest.mark.drill
 def test_a_tolerance_of_a_column_is_for_what_was_given() -> None:
     """Beside a right state, too."""
     run = (

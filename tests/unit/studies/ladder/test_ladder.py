@@ -43,6 +43,7 @@ def climb(tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]) 
     return run
 
 
+@pytest.mark.nightly
 def test_a_model_that_is_right_on_the_grid_alone_is_wrong(
     tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]
 ) -> None:
@@ -59,7 +60,7 @@ def test_a_model_that_is_right_on_the_grid_alone_is_wrong(
         assert study.error(model, {}) == pytest.approx(wrong, abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_model_that_refuses_the_scene_has_no_terms(tmp_path: Path) -> None:
     """It stands on the ladder with its reason; what it would be without a term it cannot have is no question."""
     study = Ladder("sled", {}, Runner(Store(tmp_path)), engines=("exudyn",))

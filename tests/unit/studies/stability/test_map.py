@@ -75,6 +75,7 @@ def test_a_map(small: Any) -> None:
     assert record(StabilityStudy, json.loads(json.dumps(plain(study), allow_nan=False))) == study
 
 
+@pytest.mark.drill
 def test_no_scene_is_loaded_after_the_runs(small: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """The record of a map is made from the scenes that were run."""
 
@@ -218,7 +219,7 @@ def test_one_point_is_told_as_one() -> None:
     assert "before the run: 1 point." in said
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
     """Where an engine has no program of its own, the program asks proofroll, says why, and shows what is there."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
@@ -253,7 +254,7 @@ def test_a_quick_map_leaves_out_the_longest_runs() -> None:
     assert Effort().values_of(horizon) == horizon.values
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_of_each_formulation_the_matched_settings(tmp_path: Path) -> None:
     """Where only matched settings are mapped, others of the same formulation are not, but where it has no matched."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
@@ -443,6 +444,7 @@ def test_broken_files(tmp_path: Path, old: str, new: str, words: str) -> None:
         file_for(str(path))
 
 
+@pytest.mark.drill
 def test_a_scene_without_a_file(tmp_path: Path) -> None:
     """A scene for which nobody wrote axes has its own parameters, in parts of their defaults that its bounds allow."""
     folder = tmp_path / "my_scene"
@@ -453,6 +455,8 @@ def test_a_scene_without_a_file(tmp_path: Path) -> None:
     assert all(scene.parameters[axis.name] and 1.0 in axis.values for axis in axes[:-1])
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("scene", ["sphere_in_cylinder", "inclined_plane"])
 def test_our_files_can_be_read(scene: str) -> None:
     """Every axis of our own files gives scenes that exist."""

@@ -40,6 +40,8 @@ def leaning_rod(lean: float, friction: float, turn: Rotation) -> Mechanism:
     return Mechanism((rod,), (plane,), gravity=(gx, gy, gz), geometries=shapes, pairs=(pair,))
 
 
+@pytest.mark.one_in(3)
+@pytest.mark.drill
 @pytest.mark.drill_of("0.1-0.3-0.9-0")
 @ONE_TURN
 @pytest.mark.parametrize(("lean", "friction", "until"), [(0.9, 0.2, 0.3), (0.1, 0.3, 0.9)])

@@ -152,6 +152,8 @@ CASES = [
 ]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("scene", "fault"), CASES)
 def test_a_fault_behind_the_path_is_refused(scene: str, fault: Change) -> None:
     """A wrong value, sample or event breaks a law, by more than ten times its allowance."""
@@ -161,6 +163,8 @@ def test_a_fault_behind_the_path_is_refused(scene: str, fault: Change) -> None:
     assert max(part for part, _, _ in check.residuals.largest.values()) > 10
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("scene", sorted({item[1] for item in FAULTS}))
 def test_an_honest_answer_holds_all_laws(scene: str) -> None:
     """Samples all lie on pieces that tile the time, and no residual exceeds a tenth of its allowance."""
@@ -183,6 +187,7 @@ def test_a_hole_in_the_motion_is_refused() -> None:
     assert check.held < check.samples
 
 
+@pytest.mark.drill
 def test_a_stop_is_held_whatever_kind_of_truth_was_chosen() -> None:
     """A joint that swings through a stop which the truth has forgotten is refused by the scene's own limits."""
     element, motion, dataset = answer("pendulum")
@@ -206,6 +211,7 @@ def test_an_impact_that_was_published_has_the_restitution_of_the_scene(scene: st
     assert held_answer(other, dataset, motion.tiles, TIMES).residuals.largest["rebound"][0] > 10
 
 
+@pytest.mark.nightly
 def test_works_are_held_across_an_impact() -> None:
     """A motor's work behind a blow on what it moves is that of its force and of its impulse."""
     (element,) = plate_and_ball().elements
@@ -220,6 +226,7 @@ def test_works_are_held_across_an_impact() -> None:
     assert held_answer(element, wrong, motion.tiles, LIFTED).residuals.largest["work"][0] > 10
 
 
+@pytest.mark.drill
 def test_a_broken_law_ends_a_truth_and_keeps_what_lies_before(monkeypatch: pytest.MonkeyPatch) -> None:
     """The truth has the samples before the fault, and says what breaks which law; from the start it is refused."""
     plain = MechanismTruth.__dict__["_dataset"].__func__
@@ -263,6 +270,7 @@ def test_a_motion_is_cut_with_its_events_and_bars() -> None:
 UNTOLD = {"unpressed", "event_high", "event_low", "event_height"}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     "scene", ["slide_to_roll", "stop", "double_pendulum", "engine_on_mounts", "servo", "gear_pair"]
@@ -280,6 +288,8 @@ def test_each_variable_that_is_published_is_held(scene: str) -> None:
     assert silent <= UNTOLD
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "name",
     ["gap", "down", "across_rate", "omega1", "omega3", "cone_excess", "natural_map", "drift", "forces", "positions"],

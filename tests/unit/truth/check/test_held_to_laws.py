@@ -26,6 +26,7 @@ _BY_WORDS = {fault.words: fault for fault in FAULTS}
 IMPACT = 0.1428  # s, at which the thrown ball lands
 
 
+@pytest.mark.drill
 def test_a_contact_that_closes_early_ends_the_truth_there() -> None:
     """The truth keeps its values before the impact, has none after it, and names the law and its part."""
     ball, until = SCENES["grip"]
@@ -40,6 +41,7 @@ def test_a_contact_that_closes_early_ends_the_truth_there() -> None:
     assert not motion.laws
 
 
+@pytest.mark.drill
 def test_a_fault_from_the_start_is_refused() -> None:
     """A truth of which nothing is known has no values."""
     ball, until = SCENES["grip"]
@@ -47,6 +49,7 @@ def test_a_fault_from_the_start_is_refused() -> None:
         MechanismTruth.truth(MechanismElement(ball()), np.linspace(0.0, until, 3), ())
 
 
+@pytest.mark.drill
 def test_a_truth_says_that_it_holds_all_laws() -> None:
     """The motion and the line of a run have the outcome."""
     ball, until = SCENES["grip"]
@@ -66,6 +69,8 @@ def held_servo(held: str, delay: int) -> Mechanism:
     return Mechanism((wheel,), (hinge,), actuators=(servo,), control=control)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("held", "delay"), [("target", 1), ("effort", 0)])
 def test_what_a_controller_sets_follows_its_law(held: str, delay: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values that are held between instants are those of the formula at the instant; a fault of a millionth is seen."""
@@ -82,6 +87,7 @@ def test_what_a_controller_sets_follows_its_law(held: str, delay: int, monkeypat
     assert "effort = law of the actuator" in attributes[ENDED]
 
 
+@pytest.mark.drill
 def test_the_bars_hold_what_a_closed_form_misses(monkeypatch: pytest.MonkeyPatch) -> None:
     """Velocities of a closed form that are a millionth off are a millionth from both routes, and so are their bars."""
     bob = Body("bob", 1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01))

@@ -18,6 +18,7 @@ from proofroll_drill.law_faults import SCENES
 DIGITS = 1e-11  # relative to the largest value of a record; 1e-13 is seen
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("links")
 @pytest.mark.parametrize("make", [SCENES[name][0] for name in ("slide", "rod", "links")], ids=["slide", "rod", "links"])
 def test_compiled_records_are_those_in_numbers(make: object) -> None:

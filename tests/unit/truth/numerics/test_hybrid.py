@@ -45,6 +45,7 @@ def test_a_crest_within_a_step_is_seen(below: float) -> None:
     assert stretch.end == pytest.approx(np.arcsin(1.0 - below), abs=20 * TOLERANCE[0] / np.sqrt(2 * below))
 
 
+@pytest.mark.drill
 def test_steps_grow_again_behind_one_that_is_refused() -> None:
     """Each projection that fails once for a step costs one more step, and crests that the step has seen come once."""
     failures, tries = iter([True, True, True, True]), list[float]()
@@ -94,6 +95,7 @@ def test_states_within_a_stretch_follow_from_its_steps() -> None:
     assert found[:, 0] == pytest.approx(np.sin(times), abs=1e-12)
 
 
+@pytest.mark.drill
 def test_instants_of_a_controller_are_no_changes() -> None:
     """A path with thousands of breaks reaches its end: they are known beforehand, as those of a controller at 1 kHz."""
 

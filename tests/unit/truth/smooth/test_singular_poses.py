@@ -33,6 +33,8 @@ def test_four_bar_passes_when_its_links_are_in_line(scene):
     assert singular_poses(mechanism, 1.5, 5e-3) == pytest.approx(expected, abs=1e-3)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["slider_crank", "bricard"])
 def test_regular_motion_passes_none(scene, name):
     """Minima of the singular value away from zero are not taken for singular poses."""
@@ -81,7 +83,7 @@ def test_a_parallelogram_in_closed_form_says_where_it_may_branch():
     assert "ill_posed" not in MechanismTruth.truth(element, np.array([0.0, 0.2]), ()).attrs
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_parallelogram_without_a_closed_form_ends_there_with_the_same_words():
     """Damped, no formula tells the branch, and what is before is kept."""
     found = find_truth(parallelogram(0.1), np.array([0.0, 0.2, 0.5, 1.0]))
@@ -90,7 +92,7 @@ def test_a_parallelogram_without_a_closed_form_ends_there_with_the_same_words():
     assert found.record.time.tolist() == [0.0, 0.2]
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("faster", [pytest.param(2.0**10, marks=pytest.mark.nightly), 2.0**-10])
 def test_a_mechanism_that_runs_faster_or_slower_ends_at_the_same_pose(faster):
     """Gravity, speeds and dampers that belong to another unit of time give the same end, to the last bit."""
@@ -102,7 +104,7 @@ def test_a_mechanism_that_runs_faster_or_slower_ends_at_the_same_pose(faster):
     assert faster * truths[1].end == truths[0].end
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("faster", [2.0**10, pytest.param(2.0**-10, marks=pytest.mark.nightly)])
 def test_the_witness_of_a_closed_form_is_as_good_in_another_unit_of_time(scene, faster):
     """Its steps are as long for what moves, so that the bars behind a singular pose are the same."""
@@ -146,6 +148,7 @@ def test_a_truth_that_ends_before_all_times_is_refused_for_the_reason_of_its_end
         truth_of(mechanism, np.array([0.5]))
 
 
+@pytest.mark.drill
 def test_a_loop_that_holds_nothing_has_no_rank_in_a_turned_frame():
     """Rows of a planar loop between bodies that move in one plane are round-off there, and no singular pose is near."""
     turned = (0.381, 1.0, -1.03)
@@ -171,6 +174,8 @@ def test_a_tree_has_none(scene):
     assert singular_poses(scene("chain"), 1.0, 5e-3) == []
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
     "part",
@@ -188,12 +193,13 @@ def test_a_motion_ends_at_what_lengths_cannot_tell_from_a_singular_pose(scene, p
         by_joints(scene("slider_crank", crank=0.4 * (1 - part), speed=3.0), np.array([0.0, 0.5]), 1e-10)
 
 
+@pytest.mark.nightly
 def test_a_motion_beside_a_singular_pose_goes_on(scene):
     """A length that a file tells from the singular one leads past it."""
     by_joints(scene("slider_crank", crank=0.4 * (1 - 1e-7), speed=3.0), np.array([0.0, 0.5]), 1e-10)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_stop_elsewhere_ends_no_other_way_at_a_singular_pose(scene):
     """A mechanism with a stop that it does not reach is followed by other steps, to the same pose."""
     mechanism = scene("slider_crank", crank=0.4 * (1 - 1e-10), speed=3.0)

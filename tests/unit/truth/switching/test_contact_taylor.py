@@ -46,6 +46,7 @@ def routes_of(si: Mechanism) -> list[ContactStretches]:
     ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("scene", SCENES)
 def test_compiled_equations_are_those_of_the_route(scene: str) -> None:
     """Shortly after the start, rates and guards of each route's compiled mode are those that it solves for."""
@@ -103,6 +104,7 @@ def test_a_falling_rod_slips_when_it_does_without_compilation(monkeypatch: pytes
     assert compiled.record.p_WB == pytest.approx(plain.record.p_WB, abs=1e-12)
 
 
+@pytest.mark.drill
 def test_a_sweep_compiles_once() -> None:
     """Scenes that differ in numbers alone share what is compiled, and move each in its own way."""
     pytest.importorskip("heyoka")
@@ -130,6 +132,8 @@ def driven_turntable(target: Any, torque: Any) -> Mechanism:
     return replace(m, joints=(axle, *m.joints[1:]), actuators=(motor,), springs=(spring,), forces=forces)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("target", "torque"),
     [
@@ -149,6 +153,7 @@ def test_springs_forces_motors_and_drives_are_compiled(target: Any, torque: Any)
         assert compiled.values(state[None], begun.mode)[2][0] == pytest.approx(law.rates(state), abs=1e-12)
 
 
+@pytest.mark.drill
 def test_another_table_compiles_nothing_anew() -> None:
     """Values and times of a table are parameters at run time: a motor that follows another one moves its own way."""
     pytest.importorskip("heyoka")
@@ -181,7 +186,7 @@ def test_stops_and_dry_friction_of_joints_are_compiled(law: dict[str, Any]) -> N
         )
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_effort_at_its_limit_is_compiled() -> None:
     """A motor reaches its limit and comes back: both routes stay compiled, with the limit as a guard."""
     pytest.importorskip("heyoka")
@@ -191,6 +196,7 @@ def test_an_effort_at_its_limit_is_compiled() -> None:
     assert found.events[0].time == pytest.approx(0.060258231738, abs=1e-11)
 
 
+@pytest.mark.drill
 def test_a_load_that_contacts_share_compiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """A box that slides on its four corners has no compiled mode: it takes seconds for many contacts."""
     compiled: list[object] = []
@@ -203,6 +209,7 @@ def test_a_load_that_contacts_share_compiles_nothing(monkeypatch: pytest.MonkeyP
     assert not compiled
 
 
+@pytest.mark.drill
 def test_a_slip_lands_on_the_end_of_its_stretch_but_for_round_off(monkeypatch: pytest.MonkeyPatch) -> None:
     """A last step that round-off leaves one digit before its time is the last one all the same."""
     places_at = contact_taylor.CompiledMode._places
@@ -216,6 +223,7 @@ def test_a_slip_lands_on_the_end_of_its_stretch_but_for_round_off(monkeypatch: p
     assert not any("DOP853" in route for route in truth_of(sled, np.array([0.0, 0.05])).routes)
 
 
+@pytest.mark.drill
 def test_a_route_names_the_compiled_integrator_that_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A stretch that its compiled integrator gives up is followed by DOP853, and the name of the route says so."""
     pytest.importorskip("heyoka")

@@ -97,7 +97,7 @@ def test_a_cube_that_falls_on_an_edge_rocks_to_its_rest() -> None:
 CORNER = (0.9838313410528056, 0.0987123949919223, 0.14869156426260063, -0.014918919342160731)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_two_smooth_corners_that_hit_in_turn_close_and_the_box_goes_on_an_edge() -> None:
     """Their impacts accumulate before the other edge lands: then the box lies flat, and slides without slowing."""
     found = truth_of(dropped("free", (0, 0, 0.4, *CORNER), 0.0), np.array([0.0, 0.2, 0.5]))
@@ -106,7 +106,7 @@ def test_two_smooth_corners_that_hit_in_turn_close_and_the_box_goes_on_an_edge()
     assert found.record.p_WB[2, 0] == pytest.approx([0, 0, 0.2], abs=1e-12)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_one_order_is_told_from_the_impact_at_once() -> None:
     """A cube that lands on its second edge while the first one slides has one order: it is no question of orders."""
     turn = (0.984807753012208, 0.0, -0.17364817766693033, 0.0)

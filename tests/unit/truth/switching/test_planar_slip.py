@@ -63,7 +63,7 @@ def test_a_ball_slips_from_rest_and_sticks_when_its_own_truth_says() -> None:
     assert found.bars["v_WB"][-1] < 1e-12
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_slip_that_slows_gently_ends_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its last instants take no step of its stiff direction, and end when the ball's own truth says."""
     taken, step = [0], PicardSteps.step
@@ -82,6 +82,7 @@ def test_a_slip_that_slows_gently_ends_in_one_line(monkeypatch: pytest.MonkeyPat
     assert taken[0] <= 12  # of two routes; 550 without lines
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(
@@ -129,7 +130,7 @@ def reference(mass: np.ndarray, hold: float, until: float, pull: Pull, rate_of: 
     return np.asarray(np.exp(size) * np.array([np.cos(angle), np.sin(angle)]))
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_bead_slips_against_friction_that_turns_with_its_pull() -> None:
     """A bead with another inertia along each rail, pulled harder and harder round a corner, moves as Coulomb says."""
     hold, until = 0.3 * 9.81, 1.0
@@ -185,7 +186,7 @@ def slip_under_a_push(push: float, rate: float, hold: float) -> tuple[float, flo
 PUSHED, SLIP = bead("5.2*sin(10*t)"), slip_under_a_push(5.2, 10.0, 0.5 * 9.81)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_slip_that_turns_fast_is_followed_from_its_first_instant() -> None:
     """A pull that turns by 20 rad/s as friction gives way takes the bead with it, as Coulomb's law says."""
     until, hold = 0.05, 0.5 * 9.81
@@ -199,6 +200,8 @@ def test_a_slip_that_turns_fast_is_followed_from_its_first_instant() -> None:
     assert found.record.v[-1, :2] == pytest.approx(right, abs=1e-6)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "until",
     [pytest.param(end, marks=pytest.mark.nightly if k % 4 else ()) for k, end in enumerate(np.linspace(0.13, 0.4, 20))],
@@ -216,6 +219,7 @@ def test_a_slip_that_stops_in_its_first_instants_ends_there(until: float) -> Non
         assert found.record.v[-1, 0] == pytest.approx(0.0, abs=1e-14)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("0.4", "0.25")
 @pytest.mark.drill
 @pytest.mark.parametrize("until", [0.19, 0.21, 0.25, 0.4])
@@ -258,6 +262,8 @@ def test_friction_opposes_a_slip_until_its_last_instant() -> None:
     assert found.bars["pressed"][-1] < 1e-5
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("way", [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)])
 def test_a_ball_of_unequal_moments_slides_along_an_axis_until_it_rolls(way: tuple[float, float]) -> None:
     """A slip that keeps its direction stops without a division by zero: at 2/7 of v/(μ g) for moments alike."""
@@ -317,6 +323,8 @@ def test_a_slip_begins_where_kinetic_friction_is_far_below_the_pull(pull: float)
     assert np.arctan2(slides[:, 1], slides[:, 0]) == pytest.approx(angles, rel=1e-6)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("excess", [1e-2, 1e-6])
 def test_a_slip_from_rest_may_begin_as_slowly_as_it_likes(excess: float) -> None:
     """A push just above the grip of a ball that hardly turns moves it at once, while another ball falls beside it."""

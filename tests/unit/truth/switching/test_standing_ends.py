@@ -47,6 +47,7 @@ def test_a_can_stands_where_it_is_put() -> None:
     assert found.bars["pressed"][1] < DIGITS
 
 
+@pytest.mark.drill
 def test_a_can_that_falls_on_its_end_stays() -> None:
     """One impact of the end, by the name that its contact has."""
     found = truth_of(can(0.36), np.array([0.0, 0.2, 0.6]))
@@ -59,6 +60,7 @@ def test_a_can_that_falls_on_its_end_stays() -> None:
     assert found.pressed[2, 0, 2] == pytest.approx(13.31217, abs=DIGITS)
 
 
+@pytest.mark.drill
 def test_a_can_on_a_slope_stands_up_to_the_slope_at_which_its_weight_leaves_the_end() -> None:
     """That is radius over half the length, whatever the direction of the slope."""
     limit = float(np.arctan(2 * RADIUS / LENGTH))
@@ -77,7 +79,7 @@ def test_a_can_slides_down_a_slope_on_its_end_as_a_point_does() -> None:
     assert found.record.p_WB[1, 0] == pytest.approx([0.8 * way, 0.6 * way, LENGTH / 2], abs=DIGITS)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_can_that_lands_on_a_cart_moves_on_with_it() -> None:
     """Momentum along the rail is shared: the end sticks on a plate that moves."""
     still = can(0.11)

@@ -43,6 +43,8 @@ def falling(speed: tuple[float, float, float], friction: float, turn: Rotation) 
     return Mechanism(bodies, joints, gravity=tuple(turn.apply([0, 0, -G]).tolist()), geometries=shapes, pairs=pairs)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("sled", [False, True], ids=["alone", "a sled stands by"])
 def test_a_balanced_wheel_rests_on_its_stop(sled: bool) -> None:
     """It strikes its stop at the time of its closed form and stays there, whatever else touches the ground."""
@@ -63,6 +65,8 @@ def test_a_balanced_wheel_rests_on_its_stop(sled: bool) -> None:
     np.testing.assert_allclose(found.record.q[:, 0], np.minimum(2 * TIMES, 0.5), atol=1e-13)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("speed", [(0.3, 0.0, 0.0), (0.2, -0.1, 2.0), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)], ids=str)
 @pytest.mark.parametrize(

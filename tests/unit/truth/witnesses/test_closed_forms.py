@@ -61,6 +61,7 @@ PARTS = [
 ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("name", "parameters"), PARTS)
 def test_closed_forms_are_what_maximal_coordinates_find(scene, name, parameters):
     """A route that knows nothing of the closed form reaches the same."""

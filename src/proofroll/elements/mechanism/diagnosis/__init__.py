@@ -6,7 +6,7 @@ from proofroll.core.diagnosis import Hypothesis
 from proofroll.core.diagnosis.lines import built_otherwise
 from proofroll.core.entry_points import loaded
 from proofroll.elements.mechanism.diagnosis import contacts
-from proofroll.elements.mechanism.diagnosis.contact_forces import REPORTED_FORCES
+from proofroll.elements.mechanism.diagnosis.contacts import REPORTED_FORCES
 from proofroll.elements.mechanism.diagnosis.contacts_at_start import at_start
 from proofroll.elements.mechanism.diagnosis.impacts import impacts, laws_of_impacts
 from proofroll.elements.mechanism.diagnosis.joint_laws import (
@@ -16,25 +16,22 @@ from proofroll.elements.mechanism.diagnosis.joint_laws import (
     soft_couplings,
     soft_stops,
 )
-from proofroll.elements.mechanism.diagnosis.laws_of_parts import (
-    of_applied_forces,
-    of_bushings,
-    of_motions,
-    rolling_resistance,
-)
 from proofroll.elements.mechanism.diagnosis.numbers import (
     any_gravity,
     damped_motion,
     factors_of_all,
     friction_of_each_joint,
+    of_applied_forces,
+    of_bushings,
     of_each_body,
     of_each_joint,
+    of_motions,
     of_several,
+    rolling_resistance,
 )
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
-from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS
+from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS, start_not_taken
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, PLACED, STATE
-from proofroll.elements.mechanism.diagnosis.starts import start_not_taken
 from proofroll.elements.mechanism.diagnosis.structure import (
     axis_of_first_steps,
     loop_lacks_row,

@@ -1,17 +1,27 @@
-"""Hypotheses of contacts: a wrong coefficient, a missing contact, another law of friction."""
+"""Hypotheses of contacts: a wrong coefficient, a missing contact, another law, forces that are reported wrongly."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.arrays import FloatArray, longest
-from proofroll.core.diagnosis import METHOD, Cause, Difference, Evidence, hypothesis
-from proofroll.core.diagnosis.fitting import cached_on_evidence, change_by, factor_text
+from proofroll.core.arrays import FloatArray, cross, known_difference, longest
+from proofroll.core.diagnosis import CLOSES, METHOD, Cause, Difference, Evidence, hypothesis
+from proofroll.core.diagnosis.clocks import delay_text, in_steps
+from proofroll.core.diagnosis.fitting import (
+    cached_on_evidence,
+    change_by,
+    factor_text,
+    known_factor,
+    least_squares_parameter,
+)
 from proofroll.core.diagnosis.samples import run_and_truth
+from proofroll.core.diagnosis.vectors import ReportedVector
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
-from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.diagnosis.reporting_errors import SURFACE, surface_axes
+from proofroll.elements.mechanism.diagnosis.residuals import TOUCHING_MOTION
 from proofroll.elements.mechanism.run.contacts.observables import (
     PRESSES,
     SLIDES,
@@ -21,6 +31,9 @@ from proofroll.elements.mechanism.run.contacts.observables import (
 )
 from proofroll.elements.mechanism.scene.model import Mechanism
 
+_OF_MASS = (0.5, 2.0, 1e-3, 1e3)  # factors of masses that are known mistakes
+_STEP = 1e-3  # delay that a fit tries where there is no step [s]
+_FEWEST = 4  # samples through which a curve of normals is laid
 # Least difference of forces and least overlap that point to another law, relative to the mechanism's force and size.
 FORCE, _SUNK = 1e-4, 1e-3
 _OFF = 1e-3  # largest factor of friction that counts as zero
@@ -30,8 +43,6 @@ _ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
 _UNCONVEX = "no step mends it: set cone_correction=true where the engine has it, or take Coulomb's own law"
 _HELD = 1e-6  # slip speed of the truth that counts as sticking, relative to the mechanism's speed
 FORCES_AT_START = "forces of contact"  # line of the certificate
-# A wrong contact changes all of the motion, so that no further cause of the motion is looked for.
-COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
 
 
 @dataclass(frozen=True)
@@ -150,7 +161,7 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
             remainder = longest(T - (0.0 if off else factor) * full)
             remedy, change = "give each pair its own coefficient", change_by(factor)
             # one number takes away a part of any difference; of a right one the error of the step alone is left
-            friction = Difference("friction of what slides", "N", longest(T - full), COVERS, closes=METHOD)
+            friction = Difference("friction of what slides", "N", longest(T - full), TOUCHING_MOTION, closes=METHOD)
             yield friction.cause("friction", says, remainder, remedy, 0 if off else 1, change=change)
 
 
@@ -164,7 +175,7 @@ def left_out(evidence: Evidence) -> Iterator[Cause]:
             if sunk and not touch.presses[:, k].any():
                 difference, remainder = float(np.nanmax(np.abs(true[1:, k]))), float(np.abs(touch.N[1:, k]).max())
                 says = f"the contact {contact.name} is left out"
-                force = Difference(f"normal force of {contact.name}", "N", difference, COVERS)
+                force = Difference(f"normal force of {contact.name}", "N", difference, TOUCHING_MOTION)
                 yield force.cause("left out", says, remainder, "let the pair touch")
 
 
@@ -184,7 +195,7 @@ def convex_cone(evidence: Evidence) -> Iterator[Cause]:
         # a flight from a closed gap: gap = w t - a t²/2 and its rate w - a t
         began = 2 * touch.found.gap[1, which] / (t[1] - t[0]) - touch.u_n[1, which]
         says, remainder = "convex cone: the sliding contact hops at u_n = μ|u_t|", np.abs(began - rises[which]).max()
-        speed = Difference("speed along the normal at the start", "m/s", float(rises[which].max()), COVERS)
+        speed = Difference("speed along the normal at the start", "m/s", float(rises[which].max()), TOUCHING_MOTION)
         yield speed.cause("convex cone", says, float(remainder), _UNCONVEX)
 
 
@@ -194,15 +205,12 @@ def convex_cone(evidence: Evidence) -> Iterator[Cause]:
 def convex_cone_from_rest(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: first accelerations of contacts at rest are those that the convex dual of Coulomb's law allows."""
     mechanism, start = evidence.element.mechanism, evidence.element.start
-    lines = {str(line["quantity"]): line for line in evidence.lines}
-    names = ("acceleration", "angular acceleration")
-    moves = max(float(np.abs(values).max(initial=0.0)) for values in (start.v_WB, start.w_WB))
-    sizes = [np.size(lines[name][side]) for name in names if name in lines for side in ("found", "expected")]
-    if moves > 0 or not mechanism.contacts or sizes != 4 * [start.v_WB.size]:
+    linear, angular = (evidence.vectors(name, len(start.v_WB[0])) for name in ("acceleration", "angular acceleration"))
+    if start.v_WB.any() or start.w_WB.any() or not mechanism.contacts or linear is None or angular is None:
         return
+    # accelerations of bodies at rest, as their velocities: contacts follow both alike
     of_run, of_scene = (
-        follow_contacts(replace(start, **_as_velocities(start, [lines[name][side] for name in names])))
-        for side in ("found", "expected")
+        follow_contacts(replace(start, v_WB=v[None], w_WB=w[None])) for v, w in zip(linear, angular, strict=True)
     )
     friction = np.array([contact.friction for contact in mechanism.contacts])
     rises, true = friction * of_run.slip[0], np.sum(of_scene.normal * of_scene.slide, axis=-1)[0]
@@ -214,13 +222,7 @@ def convex_cone_from_rest(evidence: Evidence) -> Iterator[Cause]:
         says = "convex cone: a body that starts to slide with the acceleration a rises with μa, and hops"
         name, difference = "acceleration along the normal at time 0", float(rises[which].max())
         remainder = float(np.abs(rate - rises[which]).max())
-        yield Difference(name, "m/s^2", difference, COVERS).cause("convex cone", says, remainder, _UNCONVEX)
-
-
-def _as_velocities(start: Placed, rates: list[FloatArray]) -> dict[str, FloatArray]:
-    """Fields of a start whose velocities are these accelerations: of bodies at rest, contacts follow both alike."""
-    linear, angular = (np.reshape(np.array(rate, dtype=np.float64), start.v_WB.shape) for rate in rates)
-    return {"v_WB": linear, "w_WB": angular}
+        yield Difference(name, "m/s^2", difference, TOUCHING_MOTION).cause("convex cone", says, remainder, _UNCONVEX)
 
 
 @hypothesis("friction pyramid", "friction that turns lies on the sides of a square, |T1| + |T2| = μN, in every sample")
@@ -254,7 +256,7 @@ def _of_a_square(
     sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)
     remainder = float(np.abs(sides - bound).max(axis=1).min())
     says = "friction pyramid: friction is bounded by a square about two axes, not by a circle"
-    friction = Difference("friction of what slides", "N", against, COVERS)
+    friction = Difference("friction of what slides", "N", against, TOUCHING_MOTION)
     yield friction.cause("pyramid", says, remainder, "choose the elliptic cone", 1)
 
 
@@ -279,11 +281,10 @@ def pyramid_at_start(evidence: Evidence) -> Iterator[Cause]:
 
 def forces_of_lines(evidence: Evidence) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]] | None:
     """Reported and true contact forces at time 0 [N], (contacts, 3), where they differ, and which are known."""
-    line = next((line for line in evidence.lines if line["quantity"] == FORCES_AT_START), None)
-    shape = (len(evidence.element.mechanism.contacts), 3)
-    if line is None or line["holds"] or np.size(line["found"]) != np.prod(shape):
+    pair = evidence.vectors(FORCES_AT_START, len(evidence.element.mechanism.contacts))
+    if pair is None or evidence.read_back(FORCES_AT_START):
         return None
-    reported, true = np.reshape(line["found"], shape), np.reshape(line["expected"], shape)
+    reported, true = pair
     return reported, true, np.asarray(np.isfinite(reported).all(axis=-1) & np.isfinite(true).all(axis=-1))
 
 
@@ -305,7 +306,7 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
         speed = float(np.sum(slip * used) / np.sum(used * used))
         says = f"contacts that stick creep at {speed:.3g} m/s times T/(μN): friction is regularised"
         remainder = float(np.abs(slip - speed * used).max())
-        creeping = Difference("slip of what sticks", "m/s", float(slip.max()), COVERS)
+        creeping = Difference("slip of what sticks", "m/s", float(slip.max()), TOUCHING_MOTION)
         yield creeping.cause("creep", says, remainder, "make that speed smaller", 1)
 
 
@@ -318,3 +319,102 @@ HYPOTHESES = (
     left_out,
     creep,
 )
+
+
+@hypothesis("contact forces", "the engine reports the true forces with another sign, frame or time")
+def contact_forces(evidence: Evidence) -> Iterator[Cause]:
+    """Hypothesis: contact forces are reported on the other body, in other axes, with other friction, or late."""
+    for touch in touch_of(evidence):
+        true_ones = touch.true_force[1:]
+        finite = np.asarray(np.isfinite(true_ones).all(axis=(0, 2)))
+        if not touch.moves_as_true or not finite.any() or "contact_forces" in evidence.settled:
+            continue  # forces of another motion cannot be compared
+        axes = surface_axes(evidence.element, placed_of(touch.mechanism, evidence.truth))
+        axes = None if axes is None else axes[1:]
+        vector = _vector(evidence.element, touch.force[1:, finite], true_ones[:, finite], touch.time[1:], axes)
+        yield from _causes(vector, touch.true.normal[1:, finite], evidence, read_back=evidence.read_back("mass"))
+        yield from _along_earlier_normals(vector, touch, finite)
+
+
+@hypothesis("contact forces at time 0", "the certificate's forces have another sign, other axes or other friction")
+def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
+    """Hypotheses of contact forces at time 0: sign, axes, sign of friction, masses."""
+    element, pair = evidence.element, forces_of_lines(evidence)
+    others = [line for line in evidence.lines if line["quantity"] != FORCES_AT_START]
+    if pair is None or not pair[2].any() or not all(line["holds"] for line in others):
+        return
+    reported, true, finite = pair
+    axes = surface_axes(element, element.start)
+    vector = _vector(element, reported[None, finite], true[None, finite], np.zeros(1), axes)
+    yield from _causes(vector, follow_contacts(element.start).normal[:, finite], evidence, read_back=False)
+
+
+def _vector(
+    element: Any, reported: FloatArray, true: FloatArray, time: FloatArray, axes: FloatArray | None
+) -> ReportedVector:
+    """Contact forces at times; ``axes``: of the wall at these, (times, 3, 3), or None."""
+    return ReportedVector(
+        name="contact_forces",
+        what="the force of a contact on its first body",
+        unit="N",
+        reported=reported,
+        true=true,
+        time=time,
+        frames={} if axes is None else {SURFACE: axes[:, None]},
+        least=element.force,
+    )
+
+
+def _causes(vector: ReportedVector, normals: FloatArray, evidence: Evidence, *, read_back: bool) -> Iterator[Cause]:
+    """Causes of wrongly reported forces; ``normals``: of the contacts, shape of the forces.
+
+    ``read_back``: True if the engine's masses are known to be the scene's.
+    """
+    if vector.differs:
+        pressing_part = np.sum(vector.true * normals, axis=-1, keepdims=True) * normals
+        says = "the friction has the wrong sign, and the normal forces are right"
+        remedy = "give the friction on the first body, not on the second"
+        yield vector.cause("friction sign", says, 2 * pressing_part - vector.true, remedy)
+    yield from vector.causes(evidence.step)
+    square = float(np.nansum(vector.true**2))
+    factor = known_factor(float(np.nansum(vector.reported * vector.true)) / square) if square else None
+    if factor is not None and factor[0] in _OF_MASS and not read_back and _by_masses_alone(evidence.element.mechanism):
+        says = f"all masses and inertias are {factor_text(factor[0])}, which moves nothing otherwise"
+        yield vector.cause("mass", says, factor[0] * vector.true, "give each body its mass and inertia once")
+
+
+def _by_masses_alone(mechanism: Mechanism) -> bool:
+    """True if all loads of a mechanism are proportional to its masses, so that a factor on them moves it alike."""
+    laws = ("stiffness", "damping", "friction", "torque", "armature")
+    loaded = any(getattr(joint, law) for joint in mechanism.joints for law in laws)
+    return not (loaded or mechanism.links or mechanism.forces or mechanism.actuators)
+
+
+def _along_earlier_normals(vector: ReportedVector, touch: SeenContact, finite: NDArray[np.bool_]) -> Iterator[Cause]:
+    """Cause that forces have the right components, along axes that are turned as the normals of another time."""
+    from scipy.interpolate import make_interp_spline
+
+    normals, step = touch.true.normal[:, finite], touch.evidence.step or _STEP
+    if not vector.differs or len(normals) < _FEWEST:
+        return
+    curve = make_interp_spline(touch.time, normals, k=3)
+    n = normals[1:]
+
+    def turned(delay: float) -> FloatArray:
+        earlier = curve(vector.time - delay)
+        axis, cosine = cross(n, earlier), np.sum(n * earlier, axis=-1, keepdims=True)
+        turning = cross(axis, vector.true)
+        return np.asarray(vector.true + turning + cross(axis, turning) / (1 + cosine))
+
+    delay = least_squares_parameter(lambda x: np.ravel(turned(x) - vector.reported), 0.0, step)
+    if longest(touch.found.normal[1:, finite] - n) > CLOSES * longest(curve(vector.time - delay) - n):
+        return  # the bodies are as far off, which explains their forces
+    moment = delay_text(delay, touch.evidence.step).rpartition(" ")[0]
+    says = f"contact_forces are along the normal of {moment} {'before' if delay > 0 else 'later'}"
+    remedy, change = "take the normal where the bodies are when the force is read", in_steps(delay, touch.evidence.step)
+    remainder = known_difference(vector.reported, turned(delay))
+    off = Difference(vector.name, vector.unit, vector.before)
+    yield off.cause(f"stale normal.{vector.name}", says, remainder, remedy, 1, change=change)
+
+
+REPORTED_FORCES = (contact_forces, forces_at_start)

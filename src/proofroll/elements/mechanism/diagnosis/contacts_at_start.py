@@ -18,8 +18,9 @@ from proofroll.core.diagnosis.fitting import (
 from proofroll.core.errors import Refused
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.contact.start import TOUCHING
-from proofroll.elements.mechanism.diagnosis.contacts import COVERS, FORCE
+from proofroll.elements.mechanism.diagnosis.contacts import FORCE
 from proofroll.elements.mechanism.diagnosis.equations import of_start
+from proofroll.elements.mechanism.diagnosis.residuals import TOUCHING_MOTION
 from proofroll.elements.mechanism.run.contacts.observables import follow_contacts
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.checks import WORLD
@@ -83,7 +84,7 @@ class _FirstAccelerations:
         It may leave no more than the steps and round-off do: a fitted number takes away a part of any difference.
         """
         closes = min(closes, self._left / self.before)
-        off = Difference("acceleration at time 0", "m/s^2", self.before, COVERS, closes=closes)
+        off = Difference("acceleration at time 0", "m/s^2", self.before, TOUCHING_MOTION, closes=closes)
         change, explains = np.inf if self._wrong else change, self._found.size
         return off.cause("contacts at time 0", says, remainder, remedy, number, explains=explains, change=change)
 

@@ -416,14 +416,12 @@ def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | Non
     element = evidence.element
     if not _moves(_modes(element, element.start)[0]):
         return None
-    lines = {line["quantity"]: line for line in evidence.lines}
     rows = []
     for name in ("acceleration", "angular acceleration"):
-        line = None if derived else lines.get(name)
-        if line is None or not line["found"] or not np.all(np.isfinite(line["found"])):
-            line = lines.get(name + OF_FIRST_STEPS)
-        if line is None or not line["found"] or not np.all(np.isfinite(line["found"])):
+        pairs = (evidence.vectors(name + when, len(element.bodies)) for when in ("", OF_FIRST_STEPS)[derived:])
+        known = [pair[0] for pair in pairs if pair is not None and np.all(np.isfinite(pair[0]))]
+        if not known:
             return None
-        rows.append(np.reshape(line["found"], (len(element.bodies), 3)))
+        rows.append(known[0])
     accelerations = np.concatenate(rows, axis=-1)[None]
     return MechanismStates(element.mechanism, element.start, accelerations, np.zeros(1, dtype=int), limits_of(element))

@@ -22,8 +22,9 @@ from proofroll.core.diagnosis.fitting import (
 )
 from proofroll.core.errors import InputError, NotUnique
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
-from proofroll.elements.mechanism.diagnosis.contacts import COVERS, touch_of
+from proofroll.elements.mechanism.diagnosis.contacts import touch_of
 from proofroll.elements.mechanism.diagnosis.equations import is_one_motion, placed_of
+from proofroll.elements.mechanism.diagnosis.residuals import TOUCHING_MOTION
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.run.contacts.observables import PRESSES, Followed, normal_forces
 from proofroll.elements.mechanism.scene.model import Mechanism
@@ -65,13 +66,13 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
             remainder = float(np.max(np.abs(delays - steps * evidence.step) + delay_bars))
             remedy = "let the impact act in the step in which the gap closes"
             closes = CLOSES * min(1.0, evidence.step / size)  # any delay is near some multiple of half a step
-            late = Difference("time of impacts", "s", size, COVERS, closes=closes)
+            late = Difference("time of impacts", "s", size, TOUCHING_MOTION, closes=closes)
             yield late.cause("late impact", says, remainder, remedy, 1, explains=len(met))
         coefficients = np.array([law[k] for k, _ in met])
         difference = float(np.abs(seen - coefficients).max())
         if difference <= _RATIO:
             continue
-        restitution, of_each = Difference("restitution", "1", difference, COVERS), sorted({k for k, _ in met})
+        restitution, of_each = Difference("restitution", "1", difference, TOUCHING_MOTION), sorted({k for k, _ in met})
         for order in itertools.permutations(of_each):
             moved = dict(zip(of_each, order, strict=True))
             remainder = float(np.max(np.abs(seen - [law[moved[k]] for k, _ in met]) + seen_bars))
@@ -176,12 +177,12 @@ def laws_of_impacts(evidence: Evidence) -> Iterator[Cause]:
             continue
         residuals = Residuals(
             functools.partial(_missed, impacts=seen),
-            *("velocities after impacts", "m/s", difference, CLOSES, COVERS, mechanism),
+            *("velocities after impacts", "m/s", difference, CLOSES, TOUCHING_MOTION, mechanism),
             functools.partial(_others, mechanism),
         )
         says, remedy = "convex cone: contacts part after an impact by μ|u_t| too fast", "take Coulomb's own law"
         remainder = float(np.max(np.abs(_missed(mechanism, seen, convex=True))))
-        velocities = Difference(residuals.quantity, residuals.unit, difference, COVERS)
+        velocities = Difference(residuals.quantity, residuals.unit, difference, TOUCHING_MOTION)
         yield velocities.cause("convex cone", says, remainder, remedy)
         for law in ("friction", "restitution"):
             factor = residuals.fit(functools.partial(_scaled, mechanism, law), 1.0)

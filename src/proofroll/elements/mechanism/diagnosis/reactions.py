@@ -183,18 +183,14 @@ def _may_be_motion(evidence: Evidence, run: Any, seen: Reactions) -> bool:
 )
 def reactions_at_start(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on forces and moments at time 0."""
-    lines = {str(line["quantity"]): line for line in evidence.lines}
-    if {name for name, line in lines.items() if not line["holds"]} - {"forces", "torques"}:
+    if {str(line["quantity"]) for line in evidence.lines if not line["holds"]} - {"forces", "torques"}:
         return
-    shape, reported, true = (1, len(evidence.element.mechanism.connections), 3), {}, {}
+    count, reported, true = len(evidence.element.mechanism.connections), {}, {}
     for kind, _, _ in _KINDS:
-        line = lines.get(f"{kind}s")
-        empty = np.full(shape, np.nan)
-        whole = line is not None and np.size(line["found"]) == empty.size
-        reported[kind] = np.reshape(line["found"], shape) if line is not None and whole else empty
-        true[kind] = np.reshape(line["expected"], shape) if line is not None else empty
-        if line is not None and line["holds"]:
-            reported[kind] = np.full(shape, np.nan)
+        pair, empty = evidence.vectors(f"{kind}s", count), np.full((1, count, 3), np.nan)
+        reported[kind] = empty if pair is None or evidence.read_back(f"{kind}s") else pair[0][None]
+        expected = (line["expected"] for line in evidence.lines if line["quantity"] == f"{kind}s")
+        true[kind] = np.reshape(next(expected, empty), empty.shape)
     for kind_of in _reactions(evidence, evidence.element.start, reported, true, {}):
         yield from kind_of.causes(evidence.step)
 

@@ -26,6 +26,8 @@ _TELLS = 1e-4
 # Quantities that follow from built numbers, and from the motion.
 COVERED = ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque")
 MOTION = ("motion", *COVERED)
+# A wrong contact changes all of the motion, so that no further cause of the motion is looked for.
+TOUCHING_MOTION = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
 # Quantities of the certificate that follow from the motion.
 _FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for when in ("", OF_FIRST_STEPS)}
 

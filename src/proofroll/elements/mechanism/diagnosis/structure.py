@@ -69,11 +69,11 @@ def _turns_about(placed: Placed, parent: int, child: int, seen: FloatArray, axis
 
 def _axes_at_start(evidence: Evidence) -> Iterator[Cause]:
     """Causes from axes in the certificate that differ from the scene's, one for each joint."""
-    line = next((line for line in differing(evidence.lines) if line["quantity"] == "joint axes"), None)
     joints = evidence.element.mechanism.joints
-    if line is None or len(line["found"]) != 3 * len(joints):
+    pair = evidence.vectors("joint axes", len(joints))
+    if pair is None or evidence.read_back("joint axes"):
         return
-    axes, expected = (np.reshape(line[key], (-1, 3)) for key in ("found", "expected"))
+    axes, expected = pair
     off = np.nan_to_num(np.max(np.abs(axes - expected), axis=1))
     difference = Difference("joint axes at time 0", "1", float(np.max(off)), ("motion",))
     for i, joint in enumerate(joints):

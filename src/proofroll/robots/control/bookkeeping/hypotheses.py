@@ -15,8 +15,8 @@ from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start
 from proofroll.elements.mechanism.diagnosis.residuals import MOTION
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import IMPLICIT, LAYERS
+from proofroll.robots.control.bookkeeping.screen import SHOWN, WHOLE, SeenMotion
 from proofroll.robots.control.bookkeeping.search import MistakeExplanation, MotionSearch, explained_start
-from proofroll.robots.control.bookkeeping.seen import SHOWN, WHOLE, SeenMotion
 
 # Names of hypotheses that look at the same number by other means.
 _SAME: Mapping[str, str] = {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -137,14 +137,7 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
         yield _sized("armature", "the armature is {size} of the right one", "acceleration", "armature", (0.9, 0.2))
     else:
         words = "there is an armature of {size} kg m²"
-        yield _fitted(
-            "armature",
-            words,
-            "acceleration",
-            lambda law, size: law.change(armature=law.armature + size),
-            _ARMATURES,
-            none=0.0,
-        )
+        yield _sized("armature", words, "acceleration", _armed, _ARMATURES, none=0.0)
     yield _signed("gravity", "gravity", "acceleration", "gravity")
 
 
@@ -156,9 +149,9 @@ def _of_servos(law: ControlLaw) -> Iterator[Mistake]:
             yield _fixed(f"{gain}_sign", f"{words} has the other sign", "effort", **{gain: -getattr(law, gain)})
     if np.isfinite(law.limit).any():
         yield _fixed("clamp_missing", "efforts have no limit", "effort", limit=np.full(len(law.joints), np.inf))
-        words, at_least = "the limit of efforts is {size} of the right one", "at least {size} of the right one"
-        clamp = _sized("clamp", words, "effort", "limit", (0.8, 0.5, 1.2))
-        yield dataclasses.replace(clamp, at_least=f"the limit of efforts is {at_least}, for no effort is larger")
+        words = "the limit of efforts is {size} of the right one"
+        at_least = f"{words.replace('{', 'at least {')}, for no effort is larger"
+        yield _sized("clamp", words, "effort", "limit", (0.8, 0.5, 1.2), at_least=at_least)
     if np.any(law.reductions != 1):
         words = "efforts are those of motors, divided by the reductions of the robot's file"
         yield _fixed("reduction", words, "effort", effort_factor=law.effort_factor / law.reductions)
@@ -181,9 +174,8 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
         yield _seen("quaternion", sentence, scalar_last=last, conjugated=True)
     yield _seen("rotation", "the rotation of the base is used the other way around", turned_back=True)
     yield _seen("gravity_sign", "the observed gravity has the other sign", gravity_sign=-law.gravity_sign)
-    observed, starts = "gravity is observed at {size} of the right size", (0.95, _STANDARD)
-    gravity = _sized("observed_gravity", observed, "observation", "gravity_sign", starts)
-    yield dataclasses.replace(gravity, absent="gravity is not observed", later=True)
+    absent, starts = "gravity is not observed", (0.95, _STANDARD)
+    yield _observed("observed_gravity", "gravity is", "gravity_sign", starts, absent)
     yield _seen("observed_before", "the policy sees the state of the step before", observed_lag=1)
     velocity, spin = "the velocity of the base is", "the angular velocity of the base is"
     yield _seen("velocity_frame", f"{velocity} observed in the base's axes", velocity_turns=1)
@@ -204,23 +196,15 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
             "observed_terms", f"{pair[0]} and {pair[1]} have each other's place in observations", exchanged=pair
         )
     names = ("the coordinates are", "the rates of the joints are", velocity, spin)
-    for k, name in enumerate(names):
-        yield _factor(k, f"{name} observed at {{size}} of the right size", f"{name} not observed")
-    yield _factor(4, "the last action is observed at {size} of the right size", "the last action is not observed")
+    for k, name in enumerate((*names, "the last action is")):
+        # a policy that saturates leads from either to the scales near it alone
+        yield _observed(f"observed_{SCALED[k]}", name, partial(_with_factor, k), (0.95, 0.1), f"{name} not observed")
 
 
 def _of_actions(law: ControlLaw) -> Iterator[Mistake]:
     """Mistakes of what an action means."""
-    clips = (0.05, 0.1, 0.3, 1.0, 3.0)
-    clipped = _fitted(
-        "action_clip",
-        "actions are clipped to ±{size}",
-        "action",
-        lambda law, size: law.change(clip=size),
-        clips,
-        none=math.inf,
-    )
-    yield dataclasses.replace(clipped, later=True)
+    words, clips = "actions are clipped to ±{size}", (0.05, 0.1, 0.3, 1.0, 3.0)
+    yield _sized("action_clip", words, "action", _clipped, clips, none=math.inf, later=True)
     for words, order in orders(law.joints):
         yield _fixed("joint_order", f"actions are for joints in another order ({words})", "target", action_order=order)
     yield _fixed("pose_missing", "the default pose is missing", "target", pose=np.zeros(len(law.joints)))
@@ -233,40 +217,49 @@ def _seen(name: str, words: str, **changes: object) -> Mistake:
     return _fixed(name, words, "observation", later=True, **changes)
 
 
-def _factor(place: int, words: str, absent: str) -> Mistake:
-    """Mistake of the size of a part of an observation."""
-
-    def changed_part(law: ControlLaw, size: float) -> ControlLaw:
-        factors = (*law.factors[:place], size * law.factors[place], *law.factors[place + 1 :])
-        return law.change(factors=factors)
-
-    starts = (0.95, 0.1)  # a policy that saturates leads from either to the scales near it alone
-    mistake = _fitted(f"observed_{SCALED[place]}", words, "observation", changed_part, starts)
-    return dataclasses.replace(mistake, absent=absent, later=True)
-
-
 def _fixed(name: str, words: str, layer: str, *, later: bool = False, **changes: object) -> Mistake:
     return Mistake(name, words, layer, lambda law, _: law.change(**changes), later=later)
 
 
-def _fitted(
-    name: str, words: str, layer: str, changed: LawChange, starts: tuple[float, ...], none: float = 1.0
+def _sized(
+    name: str,
+    words: str,
+    layer: str,
+    changed: str | LawChange,
+    starts: tuple[float, ...] = (0.95,),
+    **attributes: Any,
 ) -> Mistake:
-    return Mistake(id=name, words=words, layer=layer, changed=changed, sized=True, starts=starts, none=none)
+    """Mistake of a number, which multiplies an attribute of the law or changes it otherwise."""
+    change = partial(_scaled, changed) if isinstance(changed, str) else changed
+    return Mistake(id=name, words=words, layer=layer, changed=change, sized=True, starts=starts, **attributes)
 
 
-def _sized(name: str, words: str, layer: str, attribute: str, starts: tuple[float, ...] = (0.95,)) -> Mistake:
-    return _fitted(name, words, layer, partial(_scaled, attribute), starts)
+def _observed(name: str, what: str, changed: str | LawChange, starts: tuple[float, ...], absent: str) -> Mistake:
+    """Mistake of the size of a part of an observation."""
+    words = f"{what} observed at {{size}} of the right size"
+    return _sized(name, words, "observation", changed, starts, absent=absent, later=True)
 
 
 def _signed(name: str, what: str, layer: str, attribute: str, starts: tuple[float, ...] = (0.95, -0.5)) -> Mistake:
     """Mistake of a number that may have the other sign, too."""
-    mistake = _sized(name, f"{what} is {{size}} of the right one", layer, attribute, starts)
-    return dataclasses.replace(mistake, opposite=f"{what} has the other sign")
+    words = f"{what} is {{size}} of the right one"
+    return _sized(name, words, layer, attribute, starts, opposite=f"{what} has the other sign")
 
 
 def _scaled(attribute: str, law: ControlLaw, size: float) -> ControlLaw:
     return law.change(**{attribute: size * getattr(law, attribute)})
+
+
+def _with_factor(place: int, law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(factors=(*law.factors[:place], size * law.factors[place], *law.factors[place + 1 :]))
+
+
+def _armed(law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(armature=law.armature + size)
+
+
+def _clipped(law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(clip=size)
 
 
 def orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:

@@ -27,6 +27,7 @@ def obeys(G: np.ndarray, c: np.ndarray, f: np.ndarray, friction: np.ndarray) -> 
             assert force[1:] == pytest.approx(-mu * force[0] * slide[1:] / speed, abs=1e-6 * np.abs(f).max())
 
 
+@pytest.mark.drill
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 10_000), mu=st.floats(0.01, 0.6), count=st.integers(1, 3))
 def test_the_forces_obey_coulomb(seed: int, mu: float, count: int) -> None:

@@ -40,6 +40,7 @@ def followed(mechanism: Mechanism, times: Any) -> Any:
     return truth(Scene("log", "", (MechanismElement(mechanism),)), times)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("kind", KINDS)
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20)
@@ -63,7 +64,7 @@ def test_the_nearest_end_is_the_distance_of_the_whole_shape(kind: str, seed: int
 
 
 @pytest.mark.nightly_of("capsule")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_long_body_rolls_down_a_slope(kind: str) -> None:
     """On its side it rolls with g sin α/(1 + I/(m r²)) and both ends bear half of its weight."""
@@ -79,6 +80,8 @@ def test_a_long_body_rolls_down_a_slope(kind: str) -> None:
     np.testing.assert_allclose(ends, MASS * GRAVITY * np.cos(slope) / 2, atol=1e-9)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_long_body_strikes_with_its_lower_end(kind: str) -> None:
     """Dropped with a tilt it strikes with the lower end, at the time and with the jumps of a body struck once."""
@@ -96,6 +99,7 @@ def test_a_long_body_strikes_with_its_lower_end(kind: str) -> None:
     assert abs(drop["w_WB"].values[-1, 0, 0]) == pytest.approx(push * arm / ACROSS, rel=1e-12)
 
 
+@pytest.mark.drill
 def test_a_cylinder_lands_on_its_end_and_stands() -> None:
     """A face that lands on its whole rim stays there, and bears the weight."""
     q0 = (0, 0, LENGTH / 2 + 0.05, np.sqrt(0.5), np.sqrt(0.5), 0, 0)

@@ -40,6 +40,8 @@ def said(
     return [cause.says for cause in diagnose(Evidence(element, [], run, true, STEPS[preset]), hypotheses_of(element))]
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("preset", "words"),
@@ -52,7 +54,7 @@ def test_mujocos_laws_of_friction_are_named(preset: str, words: str) -> None:
 
 
 @pytest.mark.nightly_of("2.0-0.05")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(("until", "every"), [(2.0, 0.05), (0.6, 0.01)])
 def test_a_pyramid_whose_slip_hardly_turns_is_named(until: float, every: float) -> None:
@@ -70,6 +72,7 @@ def test_engines_with_coulombs_law_are_accused_of_nothing(engine: str, formulati
     assert said(engine, formulation, preset) == []
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 def test_creep_of_a_regularised_law_is_named_with_its_speed() -> None:
     """A sled on a slope creeps in Exudyn by its regularised friction, the cause of no force beside a right path."""
@@ -81,6 +84,7 @@ def test_creep_of_a_regularised_law_is_named_with_its_speed() -> None:
         assert any("stick creep at 0.0001 m/s" in cause.says for cause in causes) == (not settled), causes
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("unexplained", "proven"), [(0.0, True), (0.03, False)])
 def test_a_factor_of_friction_leaves_no_more_than_a_step_does(unexplained: float, proven: bool) -> None:
@@ -117,6 +121,7 @@ size = [0.1, 0.1, 0.1]
 """
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("corrects", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_a_convex_cone_is_named_from_rest_with_a_remedy_that_holds(tmp_path: Path, corrects: bool) -> None:

@@ -115,6 +115,8 @@ def run(**numbers: float) -> Any:
     return simulate(arm(**numbers), "projection", until=0.06, every=0.004)
 
 
+@pytest.mark.nightly
+@pytest.mark.one_in(4)
 @pytest.mark.drill_of("friction -1")
 @pytest.mark.parametrize(
     ("numbers", "words", "named"),
@@ -135,6 +137,8 @@ def test_a_negative_factor_along_a_run_is_a_wrong_sign_alone(
     assert any(words in each for each in said) is named, said
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("factor", "tolerance", "named"), [(0.5, 1e-5, True), (0.9, 1e-5, True), (1.0, 1e-5, False), (1.0, 3e-2, True)]
 )
@@ -148,6 +152,8 @@ def test_first_steps_of_the_scene_contradict_a_cause_of_the_run(factor: float, t
     assert any("friction of the joint elbow halved" in each for each in said) is named, said
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("foot", "factor", "words"),
     [("left", 0.5, "halved"), ("right", 0.0, "left out"), ("back", 0.0, "left out"), ("left", -0.02, "left out")],

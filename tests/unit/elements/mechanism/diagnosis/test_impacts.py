@@ -97,6 +97,7 @@ def test_one_impact_proves_no_delay(monkeypatch: pytest.MonkeyPatch) -> None:
     assert said(monkeypatch, t[first], gap[first], rate[first]) == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("law", ["friction", "restitution"])
 def test_one_impact_tells_a_law_by_all_velocities_after_it(law: str) -> None:
@@ -110,7 +111,7 @@ def test_one_impact_tells_a_law_by_all_velocities_after_it(law: str) -> None:
     assert diagnose(Evidence(element, [], true, true, STEP), hypotheses_of(element)) == []
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_impact_on_a_driven_plate_is_followed() -> None:
     """A motion takes one velocity from the mechanism; its impacts have an inertia all the same."""
     bodies = (Body("plate", 1.0, inertia=(0.1,) * 3), Body("ball", 1.0, inertia=(0.004,) * 3))
@@ -129,7 +130,7 @@ def test_an_impact_on_a_driven_plate_is_followed() -> None:
     assert struck.root.T @ struck.root == pytest.approx(np.eye(2) / 2.0)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_an_impact_of_a_body_whose_origin_rests_is_followed() -> None:
     """A pendulum's frame on its hinge does not jump: the gap says when the impact was; one velocity proves no law."""
     rod = Body("rod", 1.0, (0, 0, -0.5), (0.1, 0.1, 1e-3))

@@ -42,6 +42,7 @@ def test_resistance_against_turning_is_named() -> None:
     ]
 
 
+@pytest.mark.nightly
 def test_the_law_of_the_scene_is_not_accused() -> None:
     """A run by the scene's own law has no cause of a difference."""
     assert causes("motion") == []

@@ -39,6 +39,7 @@ def _causes(
     return diagnose(evidence, hypotheses_of(element))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize("drift", [0.0, 2e-5])
 def test_damping_is_named_although_the_pivot_creeps(drift: float) -> None:
@@ -53,7 +54,7 @@ def test_damping_is_named_although_the_pivot_creeps(drift: float) -> None:
     assert cause.says.startswith("the joint pivot has damping of 0.02")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_one_step_early_is_told_of_few_samples() -> None:
     """Eleven samples of a loop that ends a step early tell the step, and no limit of a speed."""
     scene, times = load_scene("four_bar"), np.arange(11) * 0.03
@@ -62,6 +63,7 @@ def test_one_step_early_is_told_of_few_samples() -> None:
     assert said.startswith("every sample is one step (0.002 s) early")
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(("limit", "named"), [(0.0, True), (-0.5, False)])
 def test_a_stop_is_accused_only_where_the_true_joint_turns_back_at_it(limit: float, named: bool) -> None:
@@ -70,6 +72,7 @@ def test_a_stop_is_accused_only_where_the_true_joint_turns_back_at_it(limit: flo
     assert any("turns back" in said for said in told) == named
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(("e", "until"), [(0.0, 0.2), (0.5, 0.15), (1.0, 0.3)])
 def test_a_stop_is_not_accused_where_a_step_reaches_beyond_it(e: float, until: float) -> None:
@@ -94,6 +97,7 @@ def test_a_stop_is_not_accused_where_a_step_reaches_beyond_it(e: float, until: f
         assert any("not at its stop" in cause.says for cause in causes) == told
 
 
+@pytest.mark.drill
 def test_a_stop_at_zero_that_is_never_left_can_be_misplaced() -> None:
     """A joint that rests on its stop at 0 from the start, where nothing has a size, is told to rest below it."""
     scene = _resting_on(0.0)
@@ -143,6 +147,8 @@ def _numbers(what: str, change: float) -> tuple[Scene, xr.Dataset]:
     return scene, truth(scene, np.arange(0, 0.3, 0.015))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("stop-stops-0.003-False")
 @pytest.mark.parametrize(("change", "accuses"), [(3e-3, False), (3e-2, True)])
 @pytest.mark.parametrize(("what", "name"), [("stop", "stops"), ("axis", "joint axis")])
@@ -161,6 +167,8 @@ def _accuses(name: str, scene: Scene, true: xr.Dataset, run: xr.Dataset) -> bool
     return cause.accuses
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("soft", "accuses"), [(0.0, True), (1e-4, False)])
 def test_a_ratio_that_is_exact_in_every_sample_is_no_error_of_a_method(soft: float, accuses: bool) -> None:
     """Rates with a ratio 0.3 % off accuse the engine; a part of it that changes, as of a soft coupling, does not."""
@@ -170,6 +178,8 @@ def test_a_ratio_that_is_exact_in_every_sample_is_no_error_of_a_method(soft: flo
     assert _accuses("couplings", scene, true, run) == accuses
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("at", "e", "named"), [(-0.05, 0.5, True), (-0.05, 0.45, False), (-0.01, 0.5, False)])
 def test_one_rebound_tells_a_stop_by_its_place_and_its_restitution(at: float, e: float, named: bool) -> None:
     """One rebound tells a stop beyond what two steps reach, if place and rate after it are those of its law there."""
@@ -179,7 +189,7 @@ def test_one_rebound_tells_a_stop_by_its_place_and_its_restitution(at: float, e:
     assert any(said.startswith(f"the joint guide turns back at {at:g},") for said in told) == named
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_dry_friction_of_one_of_two_joints_is_named() -> None:
     """A tenth too much friction of the elbow balances the equations, and no other number does."""
     scene, times = load_scene(str(ROUGH_ARM)), np.arange(0, 0.3, 0.01)
@@ -197,6 +207,7 @@ def _swung(name: str) -> tuple[Scene, xr.Dataset]:
     return scene, truth(scene, np.arange(0, 0.12, 0.006))
 
 
+@pytest.mark.drill
 def test_round_off_of_a_moment_that_is_zero_has_no_cause() -> None:
     """Moments of 1e-15 N m that an engine gives as zero are not left out."""
     scene, true = _swung("double_pendulum")
@@ -208,6 +219,7 @@ def test_round_off_of_a_moment_that_is_zero_has_no_cause() -> None:
     assert _told(scene, run, true) == []
 
 
+@pytest.mark.drill
 def test_reactions_that_were_judged_right_are_not_accused() -> None:
     """A difference of forces within their tolerance is none, whatever would close it."""
     scene, true = _swung("pendulum")
@@ -227,6 +239,7 @@ def test_what_is_not_finite_is_no_cause(name: str) -> None:
     assert _told(scene, run, true) == []
 
 
+@pytest.mark.drill
 def test_speeds_do_not_hide_that_places_are_off_otherwise() -> None:
     """A pendulum that a moment holds back has speeds as of a slow clock, and places as of none."""
     scene, true = _swung("pendulum")
@@ -255,6 +268,7 @@ def test_a_start_in_another_pose_does_not_accuse_gravity() -> None:
     assert not [cause for cause in diagnose(Evidence(element, lines), hypotheses_of(element)) if "gravity" in cause.id]
 
 
+@pytest.mark.drill
 def test_another_motion_is_no_misreported_velocity() -> None:
     """From rest a constant torque that is 6 % too small makes every spin 0.94 times the true one, and every angle."""
     scene, times = load_scene("pendulum"), np.arange(15) * 0.01
@@ -286,6 +300,8 @@ def _pulse(length: float, torque: float = 3.0) -> Table:
     return Table((0.0, length, length + 1e-3), (torque, torque, 0.0))
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("run", "gravity"),
     [
@@ -306,6 +322,8 @@ def test_another_push_is_no_wrong_report(run: Table | float, gravity: bool) -> N
     assert _told(scene, truth(_pushed(run, gravity), times), truth(scene, times)) == []
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.drill_of("double_pendulum")
 @pytest.mark.parametrize("name", ["pendulum", "double_pendulum"])
 def test_a_flipped_axis_is_no_inverse_rotation(name: str) -> None:
@@ -317,6 +335,7 @@ def test_a_flipped_axis_is_no_inverse_rotation(name: str) -> None:
     assert not [text for text in said if "_WB" in text]
 
 
+@pytest.mark.drill
 def test_places_and_velocities_may_both_be_of_the_centres_of_mass() -> None:
     """What turns rightly and is elsewhere is reported wrongly, though places and velocities go together."""
     scene, true = _swung("double_pendulum")
@@ -366,6 +385,8 @@ def _true_top() -> tuple[Scene, xr.Dataset]:
     return scene, truth(scene, np.arange(21) * 5e-3)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("law", "said"),
     [
@@ -382,6 +403,7 @@ def test_a_small_armature_is_an_error_of_steps(law: dict[str, float], said: list
     assert [text.partition(" of ")[0] for text in told] == said
 
 
+@pytest.mark.drill
 def test_what_vanishes_with_the_step_is_no_cause() -> None:
     """Coarse steps that move as with an armature of 7 % have no cause where the limit of small steps is the truth."""
     scene, true = _true_top()
@@ -392,6 +414,7 @@ def test_what_vanishes_with_the_step_is_no_cause() -> None:
     assert not diagnose_scene(scene, [], run, true, 5e-3, [replace(judged, limit_error=1e-4)])
 
 
+@pytest.mark.drill
 def test_a_run_that_stands_still_has_no_other_gravity() -> None:
     """Three numbers fitted to the one state of a buffer that every sample returns prove nothing."""
     scene, true = _true_top()
@@ -427,6 +450,7 @@ def test_first_steps_contradict_masses_of_another_order(factor: float, contradic
     assert contradicts_first_steps(first, 5.0, Change(mechanism, mass=masses)) is contradicted
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("1.0-1.05-False")
 @pytest.mark.drill
 @pytest.mark.parametrize(

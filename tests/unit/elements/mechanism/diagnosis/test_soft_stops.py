@@ -44,6 +44,7 @@ def test_a_soft_stop_is_named(tmp_path: Path, step: float) -> None:
     assert "stiffer" in cause.remedy
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("projection-settings0-0.04", "exudyn-settings1-2.0")
 @pytest.mark.parametrize("half", [0.04, 2.0])
 @pytest.mark.parametrize(("engine", "settings"), [("projection", {"integrator": "rk4"}), ("exudyn", {})])

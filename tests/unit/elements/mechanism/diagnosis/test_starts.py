@@ -32,6 +32,7 @@ def arm(q: Sequence[float], v: Sequence[float]) -> Scene:
     return Scene("arm", "", (MechanismElement(Mechanism(bodies, joints, gravity=(0, -9.81, 0))),))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("q0-v0-it begins at rest, without the velocities of the scene")
 @pytest.mark.drill
 @pytest.mark.parametrize(
@@ -53,6 +54,7 @@ def test_another_start_is_named(q: Sequence[float], v: Sequence[float], said: st
     assert causes[0].sentence.startswith(f"the start was not taken: {said}")
 
 
+@pytest.mark.drill
 def test_a_start_that_contacts_exclude_is_not_tried() -> None:
     """With all coordinates at zero a grip that never slips would slip: the run is wrong, and no traceback says so."""
     joint = Joint("free", "free", "world", "ball", q0=(0, 0, 0.4, 1, 0, 0, 0), v0=(1, 0, 0, 0, 0, 0))
@@ -106,6 +108,8 @@ def test_velocities_that_vanish_in_a_step_are_no_light_masses() -> None:
     assert [item.cause.id for item in causes] == ["start"]
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.parametrize("given", [True, pytest.param(False, marks=pytest.mark.drill)])
 def test_no_cause_contradicts_what_is_read_back(given: bool) -> None:
     """Masses that a model has are no cause; a run alone, of which nothing is read back, may have others."""
@@ -140,6 +144,7 @@ def test_exact_accelerations_and_a_known_mistake_are_stronger_than_what_is_read_
     assert [item.cause.id for item in diagnose_scene(scene, lines)] == said
 
 
+@pytest.mark.drill
 def test_a_start_beyond_a_stop_is_not_tried() -> None:
     """With all coordinates at zero a hinge would stand beyond its stop: the run is wrong, and no traceback says so."""
     limited = arm((0.7, 0.4), (0.0, 0.0)).elements[0].mechanism  # type: ignore[attr-defined]  # as arm makes it

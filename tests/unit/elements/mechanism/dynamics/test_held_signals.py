@@ -113,6 +113,8 @@ def test_a_held_table_belongs_to_its_own_time() -> None:
         read_signal("target", {**table, "hold": "yes"}, none, "rad")
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("table-mujoco-3.5-1e-08")
 @pytest.mark.parametrize(
     ("name", "engine", "order", "most"),
@@ -132,6 +134,8 @@ def test_an_engine_keeps_its_order(name: str, engine: str, order: float, most: f
     assert _error(name, engine, STEPS[1], "effort.hip_servo") < 2e4 * most
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.drill_of("limited")
 @pytest.mark.parametrize("name", list(SCENES))
 def test_the_truth_is_exact(name: str) -> None:
@@ -160,6 +164,8 @@ def test_the_policy_is_asked_at_the_instants() -> None:
     assert [q for _, q in asked] == pytest.approx(run["q.hip"].values[::2], abs=1e-12)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("held", "delay"), [("target", 0), ("target", 1), ("effort", 0), ("effort", 2)])
 def test_a_controller_acts_as_written(held: str, delay: int) -> None:
     """Targets and held efforts, on time and delayed, move a hinge as its equation, integrated between instants."""
@@ -204,6 +210,7 @@ def test_an_engine_built_by_hand_has_the_controller() -> None:
         assert np.abs(run["p_WB"].values - whole["p_WB"].sel(time=run["time"]).values).max() == 0
 
 
+@pytest.mark.nightly
 def test_the_truth_has_the_times_that_are_asked_for() -> None:
     """Samples at instants, which differ from the grid by round-off, keep the times of the grid to the last bit."""
     (element,) = SCENES["policy"].elements
@@ -248,6 +255,7 @@ def test_a_policy_that_is_not_there(name: str, says: str) -> None:
         PolicySource(name)
 
 
+@pytest.mark.drill
 def test_a_run_tells_what_its_policy_set() -> None:
     """The targets of a run follow from its states at the instants; without a sample at one they are not known."""
     (element,) = SCENES["policy"].elements

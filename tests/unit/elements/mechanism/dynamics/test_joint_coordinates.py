@@ -8,6 +8,7 @@ from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.files.scene_file import load_scene
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     "name", ["double_pendulum", "heavy_top", "four_bar", "bricard", "andrews_squeezer", "gear_pair", "driven_four_bar"]
 )

@@ -39,6 +39,7 @@ def pull(times: FloatArray) -> FloatArray:
     return 5.0 * np.cos(5.0 * times)
 
 
+@pytest.mark.drill
 def test_the_pull_of_a_spring_is_that_of_the_oscillator() -> None:
     """The force of a spring is k times its stretch, positive where it pulls, with a bar near round-off."""
     found = of_truth(hung())["force.s"]
@@ -57,6 +58,7 @@ def test_engines_have_the_pull_of_a_spring(formulation: str) -> None:
     assert np.max(np.abs(found - pull(TIMES[:5]))) < {"redundant": 1e-3}.get(formulation, 1e-4)
 
 
+@pytest.mark.drill
 def test_the_load_of_a_bushing_acts_on_its_second_body() -> None:
     """A bushing pushes with −k x along and −k θ about an axis of its frame, along the axes of the world."""
     turn = 0.5
@@ -77,6 +79,7 @@ def test_a_bushing_needs_a_name_of_its_own() -> None:
         Mechanism((BODY,), (Joint(**SLIDE),), bushings=(Bushing("j", "world", "b"),))
 
 
+@pytest.mark.drill
 def test_the_work_of_a_motor_is_energy_and_losses() -> None:
     """A constant push F against a damper c works F x, to its bar near round-off."""
     push, damping = 3.0, 4.0
@@ -88,6 +91,7 @@ def test_the_work_of_a_motor_is_energy_and_losses() -> None:
     assert np.max(np.abs(found.to_numpy() - push * path)) < found.attrs["error_bar"] < 1e-11
 
 
+@pytest.mark.drill
 def test_the_work_of_a_motion_is_the_energy_that_it_gives() -> None:
     """The drive of a prescribed motion works as much as the kinetic energy of the mass that it moves."""
     mechanism = Mechanism((BODY,), (Joint(**SLIDE, motion=Formula("0.1*(1 - cos(6*t))")),), gravity=(0, 0, 0))

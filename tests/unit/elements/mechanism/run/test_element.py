@@ -139,6 +139,7 @@ def test_how_far_a_model_may_soften_says_why() -> None:
     assert line.because.endswith(CAPS["acceleration"].because)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("wrong", [np.zeros((2, 5)), "heavy"], ids=["shape", "text"])
 @pytest.mark.parametrize(
     "name",
@@ -286,6 +287,8 @@ def test_bad_input_is_one_line(tmp_path, old: str, new: str, said: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.one_in(2)
+@pytest.mark.drill
 @pytest.mark.drill_of("oscillators-energy_change")
 @pytest.mark.parametrize(("scene", "name"), [("pendulum", "energy_error"), ("oscillators", "energy_change")])
 def test_a_change_of_energy_is_an_error_where_a_law_keeps_it(scene: str, name: str) -> None:
@@ -395,6 +398,7 @@ def test_a_joint_beside_its_stop_by_rounding_is_at_it(
         assert found.record.q[-1, 0] == beside
 
 
+@pytest.mark.drill
 def test_without_tracked_points_the_followed_places_move() -> None:
     """Centres of mass are followed, not origins, which may lie on the hinge; a wheel is followed by its attitude."""
     hinge = Joint("hinge", "revolute", "world", "rod", axis=(0, 1, 0), q0=(0.7,), v0=(3.0,))

@@ -42,6 +42,7 @@ def written(engine: str, options: dict[str, Any]) -> str:
     return element.failure_program(failed, part)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     ("engine", "options", "needs"),
@@ -67,6 +68,7 @@ def test_a_program_shows_the_failure(tmp_path: Path, engine: str, options: dict[
     assert "lost phase: shown" in ended.stdout
 
 
+@pytest.mark.drill
 def test_equations_of_ours_ask_proofroll() -> None:
     """Where the equations that fail are this package's, the program runs them through it and says why."""
     text = written("projection", {"formulation": "dependent", "preset": "matched"})
@@ -74,6 +76,7 @@ def test_equations_of_ours_ask_proofroll() -> None:
     assert "Why proofroll: its equations are proofroll's." in text
 
 
+@pytest.mark.drill
 def test_a_right_run_is_not_accused(tmp_path: Path) -> None:
     """With steps of a millisecond by RK4 the same program finds nothing."""
     program = tmp_path / "program.py"

@@ -80,7 +80,7 @@ def test_words() -> None:
     assert step_bound([without]) == ""
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_every_verdict_begins_with_it(tmp_path: Path) -> None:
     """Comparisons, runs and judgements of a scene with servos have the clause, a comparison above its rows."""
     pytest.importorskip("pinocchio")
@@ -96,6 +96,7 @@ def test_every_verdict_begins_with_it(tmp_path: Path) -> None:
     assert outcome_content(compare("pendulum", ["pinocchio"], out=tmp_path, until=0.2, every=0.1)).step_bound == ""
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.drill
 @pytest.mark.parametrize(("name", "armature"), [("solo12", 0.0), ("solo12", 5e-4), ("g1", 0.0), ("g1", 0.01)])
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])

@@ -52,6 +52,7 @@ def screw(folder: Path, more: str) -> Mechanism:
     return one_body(folder, "screw", f"lead = {LEAD}\n{more}")
 
 
+@pytest.mark.drill
 def test_a_nut_turns_as_it_falls(tmp_path: Path) -> None:
     """A nut under a force F along a screw of lead r has the acceleration F / (m + I/r²), in both directions of r."""
     content = of_truth(screw(tmp_path, f"q0 = 0.7\nv0 = -0.4\n{PUSH}"))
@@ -63,7 +64,7 @@ def test_a_nut_turns_as_it_falls(tmp_path: Path) -> None:
     assert np.max(np.abs(content["coupling.j"].to_numpy() - thread)) < 1e-12
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_what_a_screw_has_along_its_angle_acts_there(tmp_path: Path) -> None:
     """A spring about the axis swings the nut with the inertia I + m r²; a motion carries it along the axis."""
     content = of_truth(screw(tmp_path, "q0 = 0.5\nstiffness = 9\nrest = 0.1\n"))
@@ -109,6 +110,7 @@ def test_a_gimbal_is_a_ball_joint(tmp_path: Path) -> None:
     assert np.allclose(about, [(0, 0, 1), (0, 1, 0), (1, 0, 0)])
 
 
+@pytest.mark.drill
 def test_springs_of_a_gimbal_act_about_its_axes(tmp_path: Path) -> None:
     """Near its rest a ball of moment 1 on a gimbal swings about each axis by that axis' spring and damper."""
     size, stiffness = 1e-6, np.array([4.0, 9.0, 16.0])

@@ -103,6 +103,7 @@ def test_silent(capfd: pytest.CaptureFixture[str]) -> None:
     assert out + err == ""
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("size", [1e-6, 1e6])
 def test_size_does_not_matter(formulation: str, size: float) -> None:

@@ -47,6 +47,7 @@ def written(tmp_path: Path, text: str = TEXT) -> str:
     return str(path)
 
 
+@pytest.mark.drill
 def test_figures_and_numbers(proofroll: Proofroll, tmp_path: Path) -> None:
     """Exit 0, the files asked for, one JSON document, and the same content beside the figures."""
     out = tmp_path / "out"
@@ -61,7 +62,7 @@ def test_figures_and_numbers(proofroll: Proofroll, tmp_path: Path) -> None:
     assert (out / "height.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_wrong_number_is_a_contradiction(proofroll: Proofroll, tmp_path: Path) -> None:
     """Exit 1, and the table shows what was stated and found, within 100 columns."""
     path = written(tmp_path, TEXT.replace('"-160"', '"-150"'))
@@ -74,6 +75,8 @@ def test_a_wrong_number_is_a_contradiction(proofroll: Proofroll, tmp_path: Path)
     assert not stderr
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of('runs = ["free"]-runs = ["free"]\\ntitle = "$z_{$"-arguments4-2-its text cannot be drawn')
 @pytest.mark.drill_of('label = "free"-label = "free"-arguments5-3-no wheel, no ball')
 @pytest.mark.parametrize(

@@ -180,6 +180,7 @@ def _small(study: FigureRuns) -> FigureRuns:
     return dataclasses.replace(study, figures=figures)
 
 
+@pytest.mark.nightly
 def test_every_axis_has_a_unit(study: FigureRuns) -> None:
     """Both axes of each panel are named with a unit, in the figure and, as one shows for all, in the file."""
     for number, figure in enumerate(study.figures.figures):

@@ -18,6 +18,7 @@ def wave(level: float = 0.0, growth: float = 0.0, drift: float = 0.0) -> np.ndar
     return level + drift * T + (1 + growth * T) * np.cos(FREQUENCY * T)
 
 
+@pytest.mark.drill
 def test_a_sinusoid_is_recognised() -> None:
     """A cosine about any level leaves nothing and tells its frequency; with a second frequency it leaves just that."""
     frequency, misfit = sinusoid(T, wave(level=-5.0))

@@ -51,6 +51,7 @@ def written(tmp_path: Path, text: str) -> str:
     return str(path)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -88,6 +89,7 @@ def test_a_broken_file_is_one_line(tmp_path: Path, old: str, new: str, words: st
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.drill
 def test_files_are_found_by_scene_and_are_no_comparisons() -> None:
     """The founding scene's figures are found by its name; the file is not taken for a comparison."""
     ours = load_figures("sphere_in_cylinder")

@@ -44,6 +44,7 @@ def largest_errors(scene: Scene, engine: str, until: float, every: float) -> dic
     return {str(name): float(np.abs(run[name] - true[name]).max()) for name in compared(true, run)}
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
 def test_certificate(scene: Scene, preset: str) -> None:
@@ -57,6 +58,7 @@ def test_certificate(scene: Scene, preset: str) -> None:
     assert not engine.built().regularised  # nothing is softened
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", [name for name in SCENES if name != "cylinder"])
 def test_accuracy_everywhere(name: str) -> None:
     """The same code is as accurate for every start and every tilt."""
@@ -66,6 +68,8 @@ def test_accuracy_everywhere(name: str) -> None:
     assert max(errors["N"], errors["F2"], errors["F3"]) < 1e-11
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("integrator", "orientation", "dt"),
     [
@@ -109,12 +113,14 @@ def test_joint_transmits_what_the_multipliers_say() -> None:
     np.testing.assert_allclose(wrench.linear, force, rtol=0, atol=1e-13 * np.linalg.norm(force))
 
 
+@pytest.mark.drill
 def test_orientation_is_absent_where_it_is_not_integrated() -> None:
     """Without the orientation the sample says nothing about it, rather than something wrong."""
     for options in ("preset=matched", "preset=tuned", "preset=default,orientation=false"):
         assert "q_WB" not in simulate(cylinder(), f"pinocchio[{options}]", until=0.01)
 
 
+@pytest.mark.drill
 def test_accuracy_does_not_depend_on_sampling() -> None:
     """Samples further apart than the steps, or closer, are as accurate: each is the end of a step."""
     for until, every in ((1.0, 1.0), (0.1, 1e-3)):

@@ -34,6 +34,8 @@ def errors(scene, engine, until=2.0, every=0.1, **settings):
     return {name: float(np.max(np.abs(found[name] - true[name]))) for name in compared(true, found)}
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("engine", EXACT)
 @pytest.mark.parametrize(
     "scene",
@@ -51,6 +53,7 @@ def test_matched_holds_on_every_scene(engine, scene):
     assert max(difference[name] for name in ("N", "F2", "F3")) < 2e-11
 
 
+@pytest.mark.nightly
 def test_default_costs_accuracy_only_because_of_the_angles():
     """With rk4 at 1 ms the Euler angles, which turn at 160 rad/s, cost six digits of z; without them none are lost."""
     scene = load("sphere_in_cylinder", speed=4)
@@ -60,6 +63,7 @@ def test_default_costs_accuracy_only_because_of_the_angles():
     assert without < 5e-10  # measured 1.4e-10 m
 
 
+@pytest.mark.drill
 def test_elimination_removes_the_drift():
     """The slip stays at round-off with elimination; without it a coarse step lets it drift to mm/s."""
     scene = load("sphere_in_cylinder", speed=4, rolling_resistance=5e-4)
@@ -70,6 +74,7 @@ def test_elimination_removes_the_drift():
     assert drifting["z"] > 3 * kept["z"]
 
 
+@pytest.mark.nightly
 def test_papers_range_of_nutation(monkeypatch):
     """In the paper's run with rolling resistance θ stays within 0.86 … 2.26 rad until the ball would slip."""
     theta = []
@@ -87,6 +92,8 @@ def test_singularity_is_reported_where_the_axes_are_not_renewed(settings):
         engine.advance(0.1)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("settings", "accuracy"), [({"preset": "default", "dt": 1e-4}, 1e-4), ({}, 1e-11)])
 def test_the_axes_are_renewed_at_the_singularity(settings, accuracy):
     """A ball started steeply passes the singularity, comes where it should, and the run says what was done."""

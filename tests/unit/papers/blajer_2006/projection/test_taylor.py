@@ -44,6 +44,8 @@ def state(scene: Scene, formulation: str, t: float, **settings: Any) -> tuple[An
     return engine._motion.x, engine.sample()
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.drill_of("cylinder-resisting-euler", "tilted-euler")
 @needs_heyoka
 @pytest.mark.parametrize("formulation", ["euler", "rotating_frame"])
@@ -74,6 +76,8 @@ def test_multipliers_of_any_state(formulation: str) -> None:
     assert taylor._motion.force == pytest.approx(numeric._ball.contact_force(response), rel=1e-12)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @needs_heyoka
 @pytest.mark.parametrize(("formulation", "drift"), [("euler", 1e-11), ("rotating_frame", 1e-13)])
 def test_nothing_is_left_to_eliminate(formulation: str, drift: float) -> None:
@@ -84,6 +88,8 @@ def test_nothing_is_left_to_eliminate(formulation: str, drift: float) -> None:
     assert float(np.max(np.hypot(run["slip2"], run["slip3"]))) < drift  # of 4 m/s
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @needs_heyoka
 @pytest.mark.parametrize("preset", ["matched", "tuned"])
 def test_the_singularity(preset: str) -> None:

@@ -83,6 +83,7 @@ def test_maps_are_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert sum(runs) == study.runs
 
 
+@pytest.mark.drill
 @slow
 def test_map_follows_the_analytic_boundaries() -> None:
     """Without resistance every point of the map lies where g c/V0² and (12/7) g c/V0² say, and progress adds up."""
@@ -97,7 +98,7 @@ def test_map_follows_the_analytic_boundaries() -> None:
     assert np.array_equal(np.isnan(result.first_slip), result.regime == Regime.NEVER_SLIPS)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @slow
 def test_processes_change_nothing() -> None:
     """Two processes give the map that one gives."""

@@ -85,6 +85,7 @@ def test_a_long_motion_is_looked_at_where_times_have_digits(monkeypatch: pytest.
     assert ball_laws.checked_motion(*given, coarse=False)[1].first is not None
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("wrong_from_a_second_on")
 def test_with_its_orientation_a_violation_still_ends_the_truth() -> None:
     """The general truth, which knows no end, adds the orientation up to that end and no line that says laws hold."""

@@ -50,13 +50,14 @@ def test_stairs(parameters: dict[str, float], expected: float) -> None:
     assert slip_of(cylinder(**parameters), 4.0) == pytest.approx(expected, abs=1e-5)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_onset_is_the_first_event_of_the_truth() -> None:
     """The onset read off the curve of needed friction is where the truth begins to slip."""
     events = events_of(truth(cylinder(), np.array([0.0, 1.8])))
     assert slip_of(cylinder(), 4.0) == pytest.approx(events[0].time, abs=1e-10)
 
 
+@pytest.mark.drill
 def test_edge_separates_two_rises() -> None:
     """The edge between μ = 0.39 and 0.40, found to six digits (the bounds), is where the first slip jumps."""
     edge = edge_between(rolling_ball(cylinder()), 0.39, 0.40, 4.0)

@@ -45,6 +45,7 @@ def final_height(path: Path, route: Sliding) -> float:
     return float(route.world(path.stretches[-1].state)[0][2])
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.drill
 @pytest.mark.parametrize(
     "route", [pytest.param(SlidingTaylor, marks=needs_heyoka), pytest.param(Polar, marks=pytest.mark.drill)]
@@ -97,6 +98,7 @@ KNOWN: dict[str, tuple[dict[str, float], float, list[float], float | None]] = {
 }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.nightly_of("paper", "fast, resisted", "recovers")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", KNOWN)
@@ -128,7 +130,7 @@ def _state(motion: Any) -> tuple[Any, Any, Any]:
     return motion.p_WB, motion.v_WB, motion.w_WB
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_start_of_slip_does_not_matter() -> None:
     """No event and no end point moves when what takes the place of a start of slip varies over a decade or more."""
     body = ball(**PAPER)
@@ -153,6 +155,7 @@ def test_many_short_slips_settle() -> None:
     assert lengths[-1] < 0.1 * lengths[0]
 
 
+@pytest.mark.drill
 def test_the_published_digits_of_the_article_law(paper: xr.Dataset) -> None:
     """The paper's ball slips, sticks, slips and falls at the digits that an independent solver has, to the last one."""
     events = [event.time for event in events_of(paper)]
@@ -160,7 +163,7 @@ def test_the_published_digits_of_the_article_law(paper: xr.Dataset) -> None:
     assert float(paper["z"][-1]) == pytest.approx(-2.297658694, abs=1e-9)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_resistance_against_turning_falls_elsewhere() -> None:
     """By the law of bodies the first slip is the same, the second 8 ms later, and the fall 38 mm deeper, to 1e-6."""
     (element,) = load_scene("sphere_in_cylinder", **PAPER).elements
@@ -173,6 +176,7 @@ def test_resistance_against_turning_falls_elsewhere() -> None:
     assert float(true["z"][-1]) == pytest.approx(-2.3359491272, abs=1e-9)
 
 
+@pytest.mark.drill
 def test_state_at_the_events_of_the_paper() -> None:
     """Where the ball sticks and slips again its height and speed have the known digits; the bounds are their last."""
     times = np.array([0.0, 2.00812799, 2.44969538])

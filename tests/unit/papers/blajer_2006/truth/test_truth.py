@@ -50,6 +50,8 @@ def test_closed_form_of_the_paper(speed: float) -> None:
         assert found[name].to_numpy() == pytest.approx(values, rel=1e-12, abs=1e-12), name
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.nightly_of("0.0005-asks1")
 @pytest.mark.drill_of("0.0-asks1")
 @pytest.mark.skipif(not library.available(), reason="heyoka is not installed")
@@ -113,6 +115,7 @@ def test_first_slip_of_other_cases(speed: float, mu: float, resistance: float, t
         assert found["z"] == pytest.approx(z, abs=5e-5)
 
 
+@pytest.mark.drill
 def test_plane_formulas() -> None:
     """Down a plane a = (5/7) g sin α, friction (2/7) m g sin α, N = m g cos α; across it the speed stays."""
     alpha, t = 0.35, np.linspace(0, 2, 9)
@@ -125,6 +128,7 @@ def test_plane_formulas() -> None:
     assert found["F3"].to_numpy() == pytest.approx(0.0, abs=1e-11)
 
 
+@pytest.mark.drill
 def test_plane_with_resistance() -> None:
     """Straight down a plane the resistance lessens the acceleration by (5/7)(f/a) g cos α."""
     f, alpha = 1e-3, 0.35
@@ -176,6 +180,7 @@ def test_every_value_has_an_error_bar(scene: Scene) -> None:
             assert bar > 0, name
 
 
+@pytest.mark.nightly
 def test_friction_that_is_never_needed_changes_nothing() -> None:
     """As long as the friction needed stays below a bound, the bound does not show."""
     t = np.linspace(0, 0.5, 6)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.files.scene_file import load_scene
 
 
+@pytest.mark.drill
 def test_energy_of_a_resisted_slip_balances() -> None:
     """Rolling resistance of a ball that slips acts against its turning, not against the velocity of its centre."""
     scene = load_scene("slide_to_roll", side_spin=40, normal_spin=9, rolling_resistance=5e-3)

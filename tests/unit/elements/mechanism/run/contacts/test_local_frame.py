@@ -36,6 +36,8 @@ def test_in_flight_a_ball_has_neither_gap_nor_slip() -> None:
     assert told["between.gap"].to_numpy().tolist() == [1.0, 0.0, 1.0]
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "start"),
     [
@@ -62,6 +64,7 @@ def test_the_local_frame_leads_back_to_the_world(name: str, start: dict[str, flo
     assert run["slip"].to_numpy() == pytest.approx(0.0, abs=1e-10)
 
 
+@pytest.mark.drill
 def test_the_general_truth_of_a_ball_that_rolls_evenly_agrees_with_its_own() -> None:
     """Each variable of the local frame lies within the bars of both truths."""
     scene = load_scene("sphere_in_cylinder", axial_speed=0.7, radial_spin=12.0, rolling_resistance=5e-4)

@@ -52,6 +52,7 @@ def test_a_hop_shows_where_cone_and_direction_are_kept() -> None:
     assert hop["natural_map"] > 1.0
 
 
+@pytest.mark.drill
 def test_the_truth_leaves_nothing_and_says_normal_forces_at_rest() -> None:
     """A sled that slides and one that stands keep the law; where the split of friction is not known, N is."""
     moving = load_scene("sled")

@@ -54,6 +54,7 @@ def test_energy_balance_of_the_truth(case: tuple[Scene, xr.Dataset]) -> None:
     assert largest(energy_balance(on_wall(scene), of_ball(dataset))) < 1e-9 * lost
 
 
+@pytest.mark.drill
 def test_energy_balance_of_a_resisted_slip() -> None:
     """While a ball slips the balance counts the resistance by the law that its contact names, and by no other."""
     scene = load_scene("slide_to_roll", speed=1.0, back_spin=60.0, rolling_resistance=5e-4)
@@ -128,6 +129,7 @@ def test_rate_audit_sees_a_velocity_of_its_own(case: tuple[Scene, xr.Dataset]) -
     assert rate_audit(on_wall(scene), of_ball(drifting)) == pytest.approx(0.01, rel=1e-4)
 
 
+@pytest.mark.drill
 def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
     """What is zero at every sample of the grid, and nowhere else, shows at the samples off it."""
     scene, dataset = off_the_grid()

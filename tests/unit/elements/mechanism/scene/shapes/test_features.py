@@ -80,6 +80,8 @@ def test_two_capsules_are_as_far_apart_as_their_segments(seed: int) -> None:
     assert all(border.left_by <= 1e-14 for border in found.borders)
 
 
+@pytest.mark.drill
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("kind", [*SOLIDS, "two capsules"])
 @given(seed=st.integers(0, 10**6))
 def test_gap_and_normal_go_on_where_features_change(kind: str, seed: int) -> None:
