@@ -112,6 +112,7 @@ def sizes(judgement: RecordJudgement) -> dict[str, tuple[float, float, str]]:
     return found
 
 
+@pytest.mark.drill
 def test_a_second_of_a_noisy_log_tells_a_payload(judged: Judged) -> None:
     """A second of a noisy log is undecided, and tells the payload of the last link with a bar that covers it."""
     found = sizes(judged(0, PAYLOAD, seconds=1.0))
@@ -121,15 +122,10 @@ def test_a_second_of_a_noisy_log_tells_a_payload(judged: Judged) -> None:
     assert "link2" in words
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("payload", "friction", "seconds"),
-    [
-        (PAYLOAD, 0.0, SECONDS),
-        pytest.param(PAYLOAD, 0.0, 1.0, marks=pytest.mark.nightly),
-        pytest.param(PAYLOAD, FRICTION, SECONDS, marks=pytest.mark.nightly),
-        pytest.param(0.0, 0.0, SECONDS, marks=pytest.mark.nightly),
-    ],
+    [(PAYLOAD, 0.0, SECONDS), (PAYLOAD, 0.0, 1.0), (PAYLOAD, FRICTION, SECONDS), (0.0, 0.0, SECONDS)],
 )
 def test_bars_of_noisy_logs_cover_what_is_there(
     payload: float, friction: float, seconds: float, judged: Judged

@@ -13,10 +13,16 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, in_single_precision, known_difference
 from proofroll.core.certificate import ROUNDED
 from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, Hypothesis, above_round_off, hypothesis
-from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, delay_text, in_steps, mistaken_rate
 from proofroll.core.diagnosis.fitting import change_by
 from proofroll.core.diagnosis.lines import differing, single_precision
-from proofroll.core.diagnosis.vectors import ReportedVector
+from proofroll.core.diagnosis.vectors import (
+    ReportedVector,
+    best_clock_factor,
+    best_delay,
+    delay_text,
+    in_steps,
+    mistaken_rate,
+)
 from proofroll.core.multi_element import REQUIRED
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES
-from proofroll.core.diagnosis.clocks import best_clock_factor, best_delay, mistaken_rate
+from proofroll.core.diagnosis.vectors import best_clock_factor, best_delay, mistaken_rate
 from proofroll.core.number_format import be, number, spaced
 
 _DEGREE = np.pi / 180

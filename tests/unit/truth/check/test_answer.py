@@ -136,6 +136,11 @@ FAULTS: list[tuple[str, str, Change]] = [
         "bouncing_ball",
         of_events(lambda events: events.assign(event_energy_after=events.event_energy_before)),
     ),
+    (
+        "no energies of impacts",
+        "bouncing_ball",
+        lambda dataset: dataset.drop_vars(["event_energy_before", "event_energy_after", "event_height"]),
+    ),
     ("height after an impact off by 1e-9", "spinning_bounce", times(1 + 1e-9, "event_height")),
 ]
 

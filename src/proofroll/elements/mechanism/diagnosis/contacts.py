@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray, cross, known_difference, longest
 from proofroll.core.diagnosis import CLOSES, METHOD, Cause, Difference, Evidence, hypothesis
-from proofroll.core.diagnosis.clocks import delay_text, in_steps
 from proofroll.core.diagnosis.fitting import (
     cached_on_evidence,
     change_by,
@@ -18,7 +17,7 @@ from proofroll.core.diagnosis.fitting import (
     least_squares_parameter,
 )
 from proofroll.core.diagnosis.samples import run_and_truth
-from proofroll.core.diagnosis.vectors import ReportedVector
+from proofroll.core.diagnosis.vectors import ReportedVector, delay_text, in_steps
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, placed_of
 from proofroll.elements.mechanism.diagnosis.reporting_errors import SURFACE, surface_axes
 from proofroll.elements.mechanism.diagnosis.residuals import TOUCHING_MOTION

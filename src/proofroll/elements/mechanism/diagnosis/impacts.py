@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, hypothesis
-from proofroll.core.diagnosis.clocks import delay_text
 from proofroll.core.diagnosis.fitting import (
     ABOVE,
     CauseRow,
@@ -20,6 +19,7 @@ from proofroll.core.diagnosis.fitting import (
     factor_text,
     least_squares_parameters,
 )
+from proofroll.core.diagnosis.vectors import delay_text
 from proofroll.core.errors import InputError, NotUnique
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.diagnosis.contacts import touch_of

@@ -11,7 +11,6 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, known_difference, largest_difference, longest
 from proofroll.core.diagnosis import Cause, Difference, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.clocks import delay_text, in_steps
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import (
     another_clock,
@@ -21,7 +20,7 @@ from proofroll.core.diagnosis.samples import (
     run_and_truth,
     single_precision_run,
 )
-from proofroll.core.diagnosis.vectors import ReportedVector
+from proofroll.core.diagnosis.vectors import ReportedVector, delay_text, in_steps
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.contact.start import check_contacts

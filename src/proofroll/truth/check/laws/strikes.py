@@ -40,7 +40,9 @@ def strikes_follow(
     numbers = [number for number, _ in events]
     heights = values.get("event_height", np.full(len(changes), np.nan))[numbers]
     for name, chosen, point in (("event_energy_before", last_rows, -1), ("event_energy_after", first_rows, 0)):
-        if name in values and chosen.size:
+        if scene.contacts and chosen.size and name not in values:
+            residuals.note("strike", name, np.ones((1, 1)), 1.0, tiles.time[:1, :1])
+        elif name in values and chosen.size:
             arrays = {key: getattr(tiles, key)[chosen][:, [point]] for key in _ARRAYS}
             whole = np.zeros((len(chosen), 1, len(scene.mechanism.joints), 2))
             for (joint, k), coordinates in turns.items():
@@ -86,13 +88,12 @@ def _restitution(
     """The rate of the gap of what struck alone, by the gap in both tiles, or that of its joint turns with its e."""
     beside = tiles.ordered(np.array(sides))
     contact = next((contact for contact in scene.contacts if contact.alone and contact.name == item.name), None)
-    half = np.ptp(beside.time, axis=1) / 2
     if contact is not None:
         distance, restitution = gap_of(contact, beside), contact.pair.restitution
         came, left = (distance[0] @ _ENDS / beside.pace[0, -1], distance[1] @ _BEGINS / beside.pace[1, 0])
         far = scene.length + float(np.abs(beside.p).max())
         residuals.note("event", item.name, distance[:1, -1:] / far, 1.0, beside.time[:1, -1:])
-        noise, fast = NOISE * far / half.min(), scene.speed + float(np.abs(beside.v).max())
+        noise, fast = NOISE * far / (np.ptp(beside.time, axis=1).min() / 2), scene.speed + float(np.abs(beside.v).max())
     elif item.name in scene.mechanism.joint_index:
         number = scene.mechanism.joint_index[item.name]
         axis, restitution = scene.free(number, beside)[0], scene.mechanism.joints[number].restitution
@@ -121,7 +122,6 @@ def _height(
             roots = chebyshev.chebroots(TO_SERIES @ rates)
             inside = np.real(roots[(np.abs(np.imag(roots)) < _ROUND) & (np.abs(np.real(roots)) <= 1 + _ROUND)])
             top = np.max(chebyshev.chebval(inside, TO_SERIES @ places), initial=places[-1])
-            size = scene.length + abs(start) + abs(height)
-            off = np.array([[top - start - height]])
+            off, size = np.array([[top - start - height]]), scene.length + abs(start) + abs(height)
             residuals.note("strike", "event_height", off, size, tiles.time[[number], :1], bar)
             return
