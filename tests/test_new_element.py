@@ -120,7 +120,7 @@ def test_run(command_line: Proofroll, springs: Path) -> None:
     assert ends["sprung"] == pytest.approx(ends["truth"], abs=1e-4)
 
 
-@pytest.mark.nightly
+@pytest.mark.drill
 @pytest.mark.usefixtures("springs")
 def test_compare(command_line: Proofroll) -> None:
     """Compare judges every observable of the new kind."""

@@ -124,7 +124,7 @@ def trough(
 
 
 @pytest.mark.nightly_of("dish")
-@pytest.mark.nightly
+@pytest.mark.drill
 @pytest.mark.parametrize("kind", ["trough", "dish"])
 def test_compare(proofroll: Proofroll, trough: Path, kind: str) -> None:
     """The truth has its error bar by two routes, and engines that know any surface agree with it."""

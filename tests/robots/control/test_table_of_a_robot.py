@@ -57,7 +57,7 @@ def _blocks() -> tuple[str, list[list[str]]]:
     return toml, [shlex.split(line) for line in sh.splitlines()]
 
 
-@pytest.mark.nightly
+@pytest.mark.drill
 def test_the_commands_of_the_page_make_the_table(folder: Path, proofroll: Callable[..., tuple[int, str, str]]) -> None:
     """Each command works on a robot that the page does not know, and the table's numbers are those of plain runs."""
     check, compare = (words[1:] for words in _blocks()[1])

@@ -60,7 +60,7 @@ def test_a_comparison(
     assert ("reduced" in names) == (scene == "sphere_in_cylinder")  # it has no equations of a rod
 
 
-@pytest.mark.nightly
+@pytest.mark.drill
 def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
     """A new engine announces its class from a package that hides no other, and passes its own conformance test."""
     assert proofroll("new", "engine", "my_engine")[0] == 0

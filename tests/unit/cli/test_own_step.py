@@ -91,7 +91,7 @@ def test_the_creep_of_a_screw_shows(proofroll: Proofroll, tmp_path: Path) -> Non
     assert verdicts["mujoco[formulation=joints,preset=default]"] == "differs"
 
 
-@pytest.mark.nightly
+@pytest.mark.drill
 def test_the_line_to_change_is_named(proofroll: Proofroll, model: Callable[[str], Path], tmp_path: Path) -> None:
     """A step that is too coarse gets the line of one that would do, with which the same question is answered by yes."""
     asked = ["--until", "0.5", "--tolerance", "1e-3", "--out", str(tmp_path)]

@@ -17,7 +17,7 @@ def asked(out: Path, engine: str, *more: str) -> list[str]:
     return [*given, *(more or ("--tolerance", "1 mm"))]
 
 
-@pytest.mark.nightly
+@pytest.mark.drill
 def test_a_step_is_good_enough_or_is_not(proofroll: Proofroll, tmp_path: Path) -> None:
     """Yes with the error of what is allowed and twice the step; no with the step that it needs at best."""
     engine = "mujoco[formulation=joints,preset=matched,dt={}]"
