@@ -234,9 +234,9 @@ class ContactWalks(ABC):
         share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
         if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
             return Stretch(start=time, end=time, mode=mode, first=state, last=state, guard=share)
-        start, begun = self._kicked(time, state, mode)
+        kicked_state, kick_end = self._kicked(time, state, mode)
         try:
-            stretch = self._walked(begun, start, mode, until)
+            stretch = self._walked(kick_end, kicked_state, mode, until)
         except StoppedWithin as stopped:
             if stopped.stretch is not None:
                 stopped.stretch = replace(stopped.stretch, start=time, first=state)
