@@ -316,7 +316,7 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
         ):
             continue
         values = dataset.variables[name].values[1:]
-        mask = np.isfinite(values)
+        mask, complete = np.isfinite(values), bool(np.isfinite(values).all())
         if not item.at_impacts:
             jumps = JUMPS if item.of_contacts else JUMPS | _REVERSES
             mask[_unsteady(scene, dataset, jumps)[1:]] = False
@@ -324,8 +324,9 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
             mask[_behind_impacts(scene, dataset)[1:]] = False
         if mask.all():
             continue
-        if mask.any():
-            curves[name], determinate[name] = np.where(mask, values, 0.0), mask
+        known = np.where(mask, values, 0.0)
+        if known.any() or (complete and mask.any()):  # zeros of what does not touch tell nothing of unknown loads
+            curves[name], determinate[name] = known, mask
         else:
             curves.pop(name, None)
     return curves, determinate

@@ -81,6 +81,19 @@ def test_forces_are_compared_where_and_while_they_are_determinate() -> None:
     assert curves["contact_forces"].sum() == mask.sum()
 
 
+@pytest.mark.parametrize(("pressed", "judged"), [(0.0, True), (1.0, True), (np.nan, False)])
+def test_zeros_beside_unknown_loads_tell_nothing(pressed: float, judged: bool) -> None:
+    """Where all forces of what touches are unknown, to agree with the zero of what does not touch is no agreement."""
+    forces = np.zeros((4, 2, 3))
+    forces[:, 0] = pressed
+    true = xr.Dataset(
+        {"contact_forces": (("time", "contact", "xyz"), forces, {"units": "N", "error_bar": 1e-9})},
+        {"time": 0.1 * np.arange(4)},
+    )
+    curves, _ = _true_curves(load_scene("falling_rod"), with_events(true, [Event("impact", 0.35, 0.35, 0.35)]))
+    assert ("contact_forces" in curves) is judged
+
+
 def test_forces_beside_an_early_end_are_left_out() -> None:
     """The step of an engine that holds the last known sample may hold the impact that ends the truth, too."""
     true = xr.Dataset(
