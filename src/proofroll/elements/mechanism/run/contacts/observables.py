@@ -190,6 +190,7 @@ def residuals(
         speed: natural speed, which scales slip against weight in the natural map [m/s].
         static: coefficients while they stick; None: the same.
     """
+    kinetic = np.broadcast_to(friction, followed.slip.shape)
     friction = np.where(followed.slip > SLIDES * speed, friction, friction if static is None else static)
     n, u_n = followed.normal, np.sum(followed.normal * followed.slide, axis=-1)
     complete, has_force = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
@@ -203,12 +204,16 @@ def residuals(
     against = np.sum(T * u, axis=-1) / (np.where(slides, bound, 1.0) * np.where(slides, followed.slip, 1.0))
     # De Saxcé's correction makes the law a projection onto the cone: λ = P(λ − r (u + μ|u_t| n))
     r = weight / speed
-    slipping = np.where(np.isinf(friction), 0.0, friction)  # of what never slips the cone is a half space
-    pushed, pulled = N - r * (u_n + slipping * followed.slip), T - r * u
-    length = np.linalg.norm(pulled, axis=-1)
-    kept, holds = _onto_cone(pushed, length, friction)
-    across = pulled * (holds / np.where(length > 0, length, 1.0))[..., None] - T
-    off = np.maximum(np.abs(kept - N), np.linalg.norm(across, axis=-1))
+
+    def off_cone(friction: FloatArray) -> FloatArray:
+        slipping = np.where(np.isinf(friction), 0.0, friction)  # of what never slips the cone is a half space
+        pushed, pulled = N - r * (u_n + slipping * followed.slip), T - r * u
+        length = np.linalg.norm(pulled, axis=-1)
+        kept, holds = _onto_cone(pushed, length, friction)
+        across = pulled * (holds / np.where(length > 0, length, 1.0))[..., None] - T
+        return np.asarray(np.maximum(np.abs(kept - N), np.linalg.norm(across, axis=-1)))
+
+    off = np.minimum(off_cone(friction), off_cone(kinetic))  # what begins to slip slides already, or still sticks
     values = {
         "penetration": np.maximum(-followed.gap, 0.0),
         "contact_pull": np.maximum(-N, 0.0),

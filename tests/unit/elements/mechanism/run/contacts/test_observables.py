@@ -14,12 +14,12 @@ MU = 0.5
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def left(force: list[float], slide: list[float], gap: float = 0.0) -> dict[str, float]:
+def left(force: list[float], slide: list[float], gap: float = 0.0, static: float = MU) -> dict[str, float]:
     """Residuals of a contact on a floor at two equal samples, with a weight of 10 N and a speed of 1 m/s."""
     normal, moving = np.broadcast_to(UP, (2, 1, 3)), np.broadcast_to(slide, (2, 1, 3))
     slip = np.linalg.norm(moving[..., :2], axis=-1)
     found = Followed(np.full((2, 1), gap), slip, normal, moving, np.zeros_like(normal))
-    values = residuals(found, np.broadcast_to(force, (2, 1, 3)), np.array([MU]), 10.0, 1.0)
+    values = residuals(found, np.broadcast_to(force, (2, 1, 3)), np.array([MU]), 10.0, 1.0, np.array([static]))
     return {name: float(value[1, 0]) for name, value in values.items()}
 
 
@@ -32,6 +32,14 @@ def test_what_slides_sticks_or_is_open_leaves_nothing(force: list[float], slide:
     found = left(force, slide)
     assert found.pop("unpressed") == float(force[2] == 0)
     assert found == pytest.approx(dict.fromkeys(found, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("slip", [0.0, 1e-4, 1e-3, 0.1])
+def test_a_slip_that_begins_has_kinetic_friction(slip: float) -> None:
+    """However slow a slip is, friction at its kinetic bound leaves nothing; friction between the two bounds does."""
+    found = left([-5.0, 0.0, 10.0], [slip, 0.0, 0.0], static=1.2 * MU)
+    assert found == pytest.approx(dict.fromkeys(found, 0.0), abs=1e-12)
+    assert (left([-5.5, 0.0, 10.0], [slip, 0.0, 0.0], static=1.2 * MU)["natural_map"] > 1e-12) == (slip > 0)
 
 
 def test_each_fault_shows_in_its_residual() -> None:
