@@ -60,6 +60,16 @@ def test_the_route_of_first_slips_agrees_with_the_truth(route: Any, paper: xr.Da
     assert final_height(path, taken) == pytest.approx(float(true["z"][-1]), abs=1e-9)
 
 
+@pytest.mark.nightly
+def test_a_truth_goes_on_where_a_slip_begins_with_less_friction() -> None:
+    """At millimetres per second after the slip of 1.72 s, kinetic friction below static keeps Coulomb's law."""
+    scene = load_scene("sphere_in_cylinder", speed=4.0, mu_static=0.35, mu_kinetic=0.33, rolling_resistance=5e-4)
+    true = truth(scene, np.array([0.0, 1.7203, 1.721]))
+    assert "ended" not in true.attrs
+    assert 0 < float(true["slips"][1, 0]) < 0.01
+    assert float(np.abs(true["natural_map"]).max()) < 1e-9
+
+
 @needs_heyoka
 @pytest.mark.nightly
 @settings(max_examples=5, deadline=None)
