@@ -199,7 +199,8 @@ def residuals(
     T = np.where(complete[..., None], pressed - N[..., None] * n, 0.0)
     presses = np.asarray(PRESSES * weight < N)
     t = np.linalg.norm(T, axis=-1)
-    bound = largest_friction(friction, np.where(presses, N, 0.0))
+    bound = largest_friction(friction, np.where(N > 0, N, 0.0))
+    excess = np.maximum(t - bound, 0.0)
     slides = np.asarray(presses & complete & (followed.slip > SLIDES * speed) & (friction > 0))
     against = np.sum(T * u, axis=-1) / (np.where(slides, bound, 1.0) * np.where(slides, followed.slip, 1.0))
     # De Saxcé's correction makes the law a projection onto the cone: λ = P(λ − r (u + μ|u_t| n))
@@ -217,10 +218,10 @@ def residuals(
     values = {
         "penetration": np.maximum(-followed.gap, 0.0),
         "contact_pull": np.maximum(-N, 0.0),
-        "cone_excess": np.maximum(t - bound, 0.0),
+        "cone_excess": excess,
         "friction_direction": np.where(slides, 1.0 + against, 0.0),
         "hop_speed": np.where(presses, np.abs(u_n), 0.0),
-        "natural_map": np.where(presses, np.where(complete, off, 0.0), t),
+        "natural_map": np.where(presses, np.where(complete, off, 0.0), excess),
     }
     counts = np.arange(len(N))[:, None]
     values["unpressed"] = np.cumsum(np.where(counts > 0, np.logical_not(presses), 0), axis=0) / np.maximum(counts, 1)
