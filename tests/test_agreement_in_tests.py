@@ -101,6 +101,7 @@ def test_a_tolerance_below_the_truths_own_bar_passes_nothing() -> None:
         ({"tolerance": {"q.pivto": "1 %"}}, "this trajectory has "),
         ({"tolerance": {"positions": "1e-3 rad"}}, "its unit is m"),
         ({"tolerance": "close"}, "write 1e-4 of the path"),
+        ({"tolerance": []}, "write a positive number and a unit"),
         ({"tolerance": {}}, "give a tolerance"),
     ],
 )

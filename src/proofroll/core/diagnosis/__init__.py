@@ -74,8 +74,8 @@ class Evidence:
         """Vectors of the certificate, found and expected, each (count, 3); None: no such line has as many."""
         for line in self.lines:
             if line["quantity"] == quantity and np.size(line["found"]) == np.size(line["expected"]) == 3 * count:
-                found, expected = (np.reshape(np.array(line[key], float), (-1, 3)) for key in ("found", "expected"))
-                return found, expected
+                sides = [np.reshape(np.array(line[side], float), (-1, 3)) for side in ("found", "expected")]
+                return sides[0], sides[1]
         return None
 
 

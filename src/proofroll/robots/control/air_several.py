@@ -298,8 +298,8 @@ def _smoothed(record: ControlRecord) -> tuple[ControlRecord, float, Callable[[Ar
         alike = 1 + _WHITE / math.sqrt(len(values))
         white = (taken <= alike * noise) & (noise <= alike * taken)
         if np.all(white | (taken <= _QUIET * ranges)) and np.any(white & (noise > _QUIET * ranges)):
-            found = dict(zip(columns, smoother.T, strict=True))
-            return replace(record, columns={**record.columns, **found}), float((noise / ranges).max()), smooth, width
+            curves = dict(zip(columns, smoother.T, strict=True))
+            return replace(record, columns={**record.columns, **curves}), float((noise / ranges).max()), smooth, width
     return None
 
 

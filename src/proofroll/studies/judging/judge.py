@@ -354,7 +354,7 @@ def _bounds(
         every = Tolerance(2 * reference.sampled_bar, False, "s")
         tolerances = dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
         return tolerances | dict.fromkeys(events, every)
-    if isinstance(bounds, Sequence):
+    if bounds and isinstance(bounds, Sequence):
         main = [name for name in dict.fromkeys([scene.deciding, *judged_names(scene)]) if name in observed] or able
         texts = [bounds] if isinstance(bounds, str) else bounds
         return bounds_of(texts, {name: _unit(reference, name) for name in main}, unit_of)

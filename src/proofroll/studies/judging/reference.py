@@ -316,7 +316,7 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
         ):
             continue
         values = dataset.variables[name].values[1:]
-        mask, complete = np.isfinite(values), bool(np.isfinite(values).all())
+        mask = np.isfinite(values)
         if not item.at_impacts:
             jumps = JUMPS if item.of_contacts else JUMPS | _REVERSES
             mask[_unsteady(scene, dataset, jumps)[1:]] = False
@@ -324,9 +324,9 @@ def _true_curves(scene: Scene, dataset: xr.Dataset) -> tuple[dict[str, FloatArra
             mask[_behind_impacts(scene, dataset)[1:]] = False
         if mask.all():
             continue
-        known = np.where(mask, values, 0.0)
-        if known.any() or (complete and mask.any()):  # zeros of what does not touch tell nothing of unknown loads
-            curves[name], determinate[name] = known, mask
+        curve = np.where(mask, values, 0.0)
+        if curve.any() or (mask.any() and np.isfinite(values).all()):  # zeros beside unknown loads tell nothing
+            curves[name], determinate[name] = curve, mask
         else:
             curves.pop(name, None)
     return curves, determinate

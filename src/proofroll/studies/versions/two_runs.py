@@ -69,24 +69,24 @@ def numbers_apart(
         sizes: observable -> its size, to which its difference is relative; by default its largest value.
     """
     differences = []
-    values, rivals = observe(scene, data), observe(scene, new_data)
-    for name, mine in values.items():
-        item, theirs = scene.observables[name], rivals.get(name)
-        if theirs is None or item.role not in {Role.MOTION, Role.REACTION} or mine.ndim != theirs.ndim:
+    curves, rivals = observe(scene, data), observe(scene, new_data)
+    for name, curve in curves.items():
+        item, rival = scene.observables[name], rivals.get(name)
+        if rival is None or item.role not in {Role.MOTION, Role.REACTION} or curve.ndim != rival.ndim:
             continue
-        theirs = on_turns_of(mine, theirs, name, (data, new_data))
-        if theirs is None:
+        rival = on_turns_of(curve, rival, name, (data, new_data))
+        if rival is None:
             continue
-        count = min(len(mine), len(theirs))
-        if mine[:count].shape != theirs[:count].shape or np.array_equal(mine[:count], theirs[:count], equal_nan=True):
+        count = min(len(curve), len(rival))
+        if curve[:count].shape != rival[:count].shape or np.array_equal(curve[:count], rival[:count], equal_nan=True):
             continue
-        difference = float(np.nanmax(np.abs(mine[:count] - theirs[:count]), initial=0.0))
-        relative = difference / (sizes.get(name) or float(np.nanmax(np.abs(mine), initial=0.0)) or 1.0)
+        difference = float(np.nanmax(np.abs(curve[:count] - rival[:count]), initial=0.0))
+        relative = difference / (sizes.get(name) or float(np.nanmax(np.abs(curve), initial=0.0)) or 1.0)
         kind = NumberKind.ROUND_OFF if relative <= ROUND_OFF else NumberKind.CHANGED  # NaN counts as a difference
         differences.append(
             NumbersApart(quantity=name, unit=item.unit, difference=difference, relative=relative, kind=kind)
         )
-    return sorted(differences, key=lambda apart: -apart.relative if apart.relative >= 0 else -math.inf)
+    return sorted(differences, key=lambda item: -item.relative if item.relative >= 0 else -math.inf)
 
 
 # Times of two runs are one instant up to this part of the longer run: samples are rounded to the step of the engine.
@@ -128,12 +128,10 @@ class TwoRuns:
         if not self.numbers:
             return f"Both runs of {self.scene} have the same bits {at_instants}."
         worst = self.numbers[0]
-        size, apart = number(worst.relative), f"{number(worst.difference)}{spaced(worst.unit)}"
+        size, gap = number(worst.relative), f"{number(worst.difference)}{spaced(worst.unit)}"
         if worst.kind == NumberKind.ROUND_OFF:
             return f"Both runs of {self.scene} are equal to {size} of each size {at_instants}."
-        return (
-            f"Both runs of {self.scene} differ, most in {worst.quantity}: {apart}, {size} of its size, {at_instants}."
-        )
+        return f"Both runs of {self.scene} differ, most in {worst.quantity}: {gap}, {size} of its size, {at_instants}."
 
     @property
     def lines(self) -> Iterator[str]:
@@ -170,7 +168,7 @@ def two_runs(old: Path, new: Path) -> TwoRuns:
     sizes = {name: size for name, size in scales(scene, data).items() if np.isfinite(size)}
     events, new_events = events_of(data), events_of(new_data)
     kinds, new_kinds = ([(event.kind, event.name) for event in run] for run in (events, new_events))
-    apart = [abs(event.time - rival.time) for event, rival in zip(events, new_events, strict=False)]
+    delays = [abs(event.time - rival.time) for event, rival in zip(events, new_events, strict=False)]
     return TwoRuns(
         old=str(old),
         new=str(new),
@@ -179,7 +177,7 @@ def two_runs(old: Path, new: Path) -> TwoRuns:
         about=_about(data, new_data),
         numbers=numbers_apart(scene, data, new_data, sizes),
         events=(len(events), len(new_events)),
-        event_time=max(apart, default=0.0) if kinds == new_kinds else None,
+        event_time=max(delays, default=0.0) if kinds == new_kinds else None,
     )
 
 
@@ -220,10 +218,10 @@ def _at_shared_instants(data: xr.Dataset, new_data: xr.Dataset, path: Path) -> t
     times, new_times = (item["time"].to_numpy() for item in (data, new_data))
     if not (len(times) and len(new_times)):
         raise InputError("new", path, "one of the runs has no samples")
-    right = np.clip(np.searchsorted(new_times, times), 0, len(new_times) - 1)
-    left = np.maximum(right - 1, 0)
-    nearest = np.where(np.abs(new_times[left] - times) < np.abs(new_times[right] - times), left, right)
-    shared = np.abs(new_times[nearest] - times) <= _ONE_INSTANT * max(times[-1], new_times[-1])
-    if np.count_nonzero(shared) < 2:
+    end = np.clip(np.searchsorted(new_times, times), 0, len(new_times) - 1)
+    start = np.maximum(end - 1, 0)
+    place = np.where(np.abs(new_times[start] - times) < np.abs(new_times[end] - times), start, end)
+    mask = np.abs(new_times[place] - times) <= _ONE_INSTANT * max(times[-1], new_times[-1])
+    if np.count_nonzero(mask) < 2:
         raise InputError("new", path, "has no samples at the times of the other run; run both with one --every")
-    return data.isel(time=np.flatnonzero(shared)), new_data.isel(time=nearest[shared])
+    return data.isel(time=np.flatnonzero(mask)), new_data.isel(time=place[mask])

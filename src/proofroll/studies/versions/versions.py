@@ -33,20 +33,20 @@ def comparisons_about(subjects: Sequence[str], engine: str) -> list[Comparison]:
         if not comparisons:
             raise InputError("engine", engine, "no comparison has rows of it; name a scene or a comparison")
         return comparisons
-    named = [item for subject in dict.fromkeys(subjects) for item in _about(subject, engine)]
-    return [item for place, item in enumerate(named) if item not in named[:place]]
+    choices = [item for subject in dict.fromkeys(subjects) for item in _about(subject, engine)]
+    return [item for place, item in enumerate(choices) if item not in choices[:place]]
 
 
 def _about(subject: str, engine: str) -> list[Comparison]:
     """The comparison of a name, or those about a scene, that have rows of the engine. Raises InputError."""
     if not is_scene(subject):
-        loaded = load_comparison(subject)
-        if not _rows_of(loaded, engine):
-            raise InputError("engine", engine, f"{loaded.name} has no rows of it")
-        return [loaded]
+        comparison = load_comparison(subject)
+        if not _rows_of(comparison, engine):
+            raise InputError("engine", engine, f"{comparison.name} has no rows of it")
+        return [comparison]
     files = [path for folder in study_folders() for path in sorted(folder.rglob("*.toml")) if study_of(path) is None]
-    about = [item for path in files if (item := load_comparison(str(path))).scene == subject and _rows_of(item, engine)]
-    return about or [_of_scene(subject, engine)]
+    picks = [item for path in files if (item := load_comparison(str(path))).scene == subject and _rows_of(item, engine)]
+    return picks or [_of_scene(subject, engine)]
 
 
 def _rows_of(comparison: Comparison, engine: str) -> list[Row]:

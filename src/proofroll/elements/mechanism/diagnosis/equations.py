@@ -419,9 +419,9 @@ def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | Non
     rows = []
     for name in ("acceleration", "angular acceleration"):
         pairs = (evidence.vectors(name + when, len(element.bodies)) for when in ("", OF_FIRST_STEPS)[derived:])
-        known = [pair[0] for pair in pairs if pair is not None and np.all(np.isfinite(pair[0]))]
-        if not known:
+        rates = [pair[0] for pair in pairs if pair is not None and np.all(np.isfinite(pair[0]))]
+        if not rates:
             return None
-        rows.append(known[0])
+        rows.append(rates[0])
     accelerations = np.concatenate(rows, axis=-1)[None]
     return MechanismStates(element.mechanism, element.start, accelerations, np.zeros(1, dtype=int), limits_of(element))
