@@ -39,6 +39,7 @@ def test_accepted_causes(proofroll: Proofroll, damped: Path) -> None:
     assert {cause["id"] for cause in row["causes"]} == {"damping_left_out", "friction_left_out"}
 
 
+@pytest.mark.drill
 def test_accepted_beside_the_file(proofroll: Proofroll, damped: Path) -> None:
     """Causes in a file beside the robot's are accepted together with those of the command."""
     asked = ("check", str(damped), "--engine", "pinocchio", "--states", "2")
