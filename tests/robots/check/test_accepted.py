@@ -78,6 +78,7 @@ def test_repeated_findings() -> None:
     assert list(remark_lines(found[:2])) == ["note: link l0, link l1: it is turned"]
 
 
+@pytest.mark.drill
 def test_notes_stand_below(proofroll: Proofroll, tmp_path: Path) -> None:
     """Warnings stand above the table, notes below it."""
     path = tmp_path / "arm.urdf"
