@@ -14,6 +14,8 @@ from proofroll.robots.check.terminal import remark_lines
 from proofroll.robots.files.robot_file import LintRemark
 
 Proofroll = Callable[..., tuple[int, str, str]]
+
+pytestmark = pytest.mark.drill  # each imports an engine, or the first of them does
 BOTH = '<dynamics damping="0.7" friction="0.4"/>'
 
 
@@ -25,7 +27,6 @@ def damped(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.drill
 def test_accepted_causes(proofroll: Proofroll, damped: Path) -> None:
     """A difference exits 0 if all of its causes are accepted, and 1 if one is not; the causes are told all the same."""
     asked = ("check", str(damped), "--engine", "pinocchio", "--states", "2")
@@ -39,7 +40,6 @@ def test_accepted_causes(proofroll: Proofroll, damped: Path) -> None:
     assert {cause["id"] for cause in row["causes"]} == {"damping_left_out", "friction_left_out"}
 
 
-@pytest.mark.drill
 def test_accepted_beside_the_file(proofroll: Proofroll, damped: Path) -> None:
     """Causes in a file beside the robot's are accepted together with those of the command."""
     asked = ("check", str(damped), "--engine", "pinocchio", "--states", "2")
@@ -78,7 +78,6 @@ def test_repeated_findings() -> None:
     assert list(remark_lines(found[:2])) == ["note: link l0, link l1: it is turned"]
 
 
-@pytest.mark.drill
 def test_notes_stand_below(proofroll: Proofroll, tmp_path: Path) -> None:
     """Warnings stand above the table, notes below it."""
     path = tmp_path / "arm.urdf"
@@ -87,7 +86,6 @@ def test_notes_stand_below(proofroll: Proofroll, tmp_path: Path) -> None:
     assert out.index("warning: wheel") < out.index("joints mass") < out.index("note: gazebo")
 
 
-@pytest.mark.drill
 def test_where_it_differs(proofroll: Proofroll, tmp_path: Path) -> None:
     """A difference names the body or joint, the state, the value that is held and the true one."""
     path = tmp_path / "arm.xml"

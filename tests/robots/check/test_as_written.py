@@ -19,6 +19,8 @@ from proofroll.robots.files.reading import AsWritten
 from proofroll.robots.protocol import Whole
 
 Proofroll = Callable[..., tuple[int, str, str]]
+
+pytestmark = pytest.mark.drill  # each imports an engine, or the first of them does
 LOOKS = '<geom type="mesh" mesh="look" contype="0" conaffinity="0" mass="0"/>'
 
 
@@ -26,7 +28,6 @@ def _rows(path: Path, *engines: str, **given: Any) -> dict[str, ImporterRow]:
     return {row.engine: row for row in check.check(path, engines, CheckSettings(states=2, **given)).engines}
 
 
-@pytest.mark.drill
 def test_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An engine that reads the file as it is says so; one that is fed says nothing; all say their names for people."""
     monkeypatch.setattr("proofroll.robots.files.reading.KNOWN_TITLES", titles := dict[str, str]())
@@ -46,7 +47,6 @@ def test_what_no_joint_moves_has_no_part(tmp_path: Path) -> None:
     assert _rows(path, "mujoco")["mujoco"].as_written == "read"
 
 
-@pytest.mark.drill
 def test_refused(proofroll: Proofroll, tmp_path: Path) -> None:
     """A file whose looks are missing is compared without them, and the refusal of the file as it is is told once."""
     path = tmp_path / "robot.xml"
@@ -61,7 +61,6 @@ def test_refused(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "absent.stl" in said
 
 
-@pytest.mark.drill
 def test_base_and_options(tmp_path: Path) -> None:
     """The file as it is is read with the base and the options that were asked for."""
     path = tmp_path / "robot.urdf"

@@ -19,10 +19,11 @@ from proofroll.robots.check.terminal import SHORT, WIDTH, lines, table
 from proofroll.robots.files.meaning import CheckSettings
 
 Proofroll = Callable[..., tuple[int, str, str]]
+
+pytestmark = pytest.mark.drill  # each imports an engine, or the first of them does
 Install = Callable[[Mapping[str, str]], None]
 
 
-@pytest.mark.drill
 def test_json(proofroll: Proofroll, arm: Path) -> None:
     """The JSON has the file, its kind and findings, and for every engine version, layers and causes."""
     names = ("mujoco", "pinocchio", "exudyn")
@@ -145,7 +146,6 @@ def test_bad_readers(proofroll: Proofroll, install_readers: Install, arm: Path) 
     assert good["status"] == "holds"
 
 
-@pytest.mark.drill
 def test_a_reader_that_hangs(proofroll: Proofroll, install_readers: Install, arm: Path) -> None:
     """An importer that never answers is a row after the time limit."""
     install_readers({"bad": "Hanging"})

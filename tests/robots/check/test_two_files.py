@@ -12,6 +12,8 @@ from robot_templates import urdf
 from proofroll.robots.check.two_files import against
 
 Proofroll = Callable[..., tuple[int, str, str]]
+
+pytestmark = pytest.mark.drill  # each imports an engine, or the first of them does
 URDF = """<robot name="arm"><link name="base"/><link name="upper"><inertial><origin xyz="0.1 0 0"/><mass value="1.5"/>
 <inertia ixx="0.01" iyy="0.02" izz="0.021" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="h" type="continuous"><parent link="base"/><child link="upper"/><origin xyz="0 0 1" rpy="0 0 0.3"/>

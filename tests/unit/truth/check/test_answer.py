@@ -201,6 +201,7 @@ def test_a_stop_is_held_whatever_kind_of_truth_was_chosen() -> None:
     assert check.residuals.largest["stop"][0] > 10
 
 
+@pytest.mark.drill
 @pytest.mark.drill_of("bouncing_ball-pairs")
 @pytest.mark.parametrize(("scene", "part"), [("bouncing_ball", "pairs"), ("stop", "joints")])
 def test_an_impact_that_was_published_has_the_restitution_of_the_scene(scene: str, part: str) -> None:
