@@ -1,7 +1,9 @@
 """Slow tests without the mark ``drill``: named at the end of a run, which fails for them where none may be there.
 
 The variable ``PROOFROLL_NO_DEAR``, which ``make test`` sets, makes the run fail; no single test fails for its duration.
-On a slow or busy machine a time is divided by that of a loop that is measured beside it.
+On a slow or busy machine a time is divided by that of a loop that is measured beside it. What is needed once in a
+process (an engine's modules, a truth that several tests hold) falls on the test that is the first to need it, which
+depends on the tests that a process was given: a slow test is run a second time, and its time is that of the second run.
 """
 
 from __future__ import annotations
@@ -15,12 +17,15 @@ from typing import Any
 
 import pytest
 import seldom
+from _pytest.runner import runtestprotocol
 from share import is_of_the_day
 
 VARIABLE = "PROOFROLL_NO_DEAR"
 # Processor time [s] above which a test is a drill (CONTRIBUTING.md), on a processor that takes LOOP [s] for the loop.
 LIMIT = 1.0
 LOOP = 0.008
+# Processor time [s] above which no first use excuses a test: it is not run again.
+FIRST_USE = 5.0
 # Largest number of tests named in the line.
 _MOST = 10
 _BEGAN = pytest.StashKey[float]()
@@ -115,6 +120,27 @@ def pytest_fixture_setup(fixturedef: pytest.FixtureDef[Any], request: pytest.Fix
     finally:
         stash = request.session.stash
         stash[_SHARED] = stash.get(_SHARED, 0.0) + _spent() - start
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """Runs a slow test without the mark ``drill`` again: its time is without what it was the first to need.
+
+    Its result is that of the first run. A failed test is left to it.
+    """
+    if not _forbidden(item.config):
+        return None
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    reports = runtestprotocol(item, nextitem=nextitem, log=False)
+    last = reports[-1]
+    told = dict(last.user_properties)
+    if not told[_MARKED] and LIMIT < told[_TOOK] < FIRST_USE and all(not report.failed for report in reports):
+        again = runtestprotocol(item, nextitem=nextitem, log=False)[-1]
+        last.user_properties.append((_TOOK, min(told[_TOOK], dict(again.user_properties)[_TOOK])))
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
 
 
 @pytest.hookimpl(tryfirst=True)
