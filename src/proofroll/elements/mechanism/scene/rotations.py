@@ -104,6 +104,13 @@ def about(axis: int, angle: Any) -> Array:
     return R
 
 
+def from_rotation_vector(turn: Array) -> Array:
+    """Rotations about the axes of vectors by their lengths, rad, shape (…, 3); shape (…, 3, 3)."""
+    K, angle = skews(turn), np.linalg.norm(turn, axis=-1)[..., None, None]
+    R: Array = _UNIT + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * K @ K
+    return R
+
+
 def from_rpy(rpy: ArrayLike) -> Array:
     """Rotation of roll, pitch, yaw about fixed axes x, y, z, rad (URDF's convention)."""
     roll, pitch, yaw = np.asarray(rpy, dtype=float)
