@@ -152,6 +152,26 @@ def to_quaternion(R: Array) -> Array:
     return np.where(q[..., :1] >= 0, q, -q)
 
 
+def quaternion_product(p: Array, q: Array) -> Array:
+    """Quaternions of turning first by ``q``, then by ``p``, shapes (…, 4)."""
+    w = p[..., :1] * q[..., :1] - (p[..., 1:] * q[..., 1:]).sum(axis=-1, keepdims=True)
+    v = p[..., :1] * q[..., 1:] + q[..., :1] * p[..., 1:] + np.cross(p[..., 1:], q[..., 1:])
+    return np.concatenate([w, v], axis=-1)
+
+
+def quaternion_of_vector(turn: Array) -> Array:
+    """Unit quaternions of rotation vectors, rad, shape (…, 3); shape (…, 4)."""
+    half = np.linalg.norm(turn, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.cos(half), np.sinc(half / np.pi) * turn / 2], axis=-1)
+
+
+def vector_of_quaternion(q: Array) -> Array:
+    """Rotation vectors of at most half a turn, rad, of unit quaternions, shape (…, 4); shape (…, 3)."""
+    q = np.where(q[..., :1] < 0, -q, q)
+    half = np.arctan2(np.linalg.norm(q[..., 1:], axis=-1, keepdims=True), q[..., :1])
+    return np.asarray(2 * q[..., 1:] / np.sinc(half / np.pi))
+
+
 def quaternion_from_z(axis: Sequence[float]) -> tuple[float, float, float, float]:
     """A unit quaternion ``(w, x, y, z)`` that turns z to a unit vector; the turn about that does not matter."""
     x, y, z = axis
