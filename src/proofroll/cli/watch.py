@@ -101,7 +101,7 @@ def _show(
 ) -> None:
     """Runs a scene in engines one after another, and writes the page after each.
 
-    The first engine starts while the parts of the page are imported here, the others behind the first page.
+    Engines start, one after another, beside the imports and the first page.
 
     Raises:
         ProofrollError: the scene makes no sense, or no engine runs it.
@@ -127,9 +127,10 @@ def _show(
 
         import_xarray()
         loaded, length = scene_of_run(scene, settings), length_of(scene, until)
+        ready |= {name: pool.submit(prepare, name, workers) for name in engines if name not in ready}
         every = max(_UNIT, round(length / _INTERVALS / _UNIT) * _UNIT)
         for name in engines:
-            (ready.get(name) or pool.submit(prepare, name, workers)).result()
+            ready[name].result()
             target = Path(folder) / f"{len(runs)}{STORED}"
             try:
                 case = single_case(scene, settings, name, until=length, every=every, time_limit=_LIMIT, workers=workers)
@@ -143,7 +144,6 @@ def _show(
             runs.append(read(target).load())
             if not asked:
                 page(runs, untold=untold)
-            ready |= {other: pool.submit(prepare, other, workers) for other in engines if other not in ready}
             longest = max((run["time"].to_numpy() for run in runs), key=len)
             if asked < len(longest):
                 asked = len(longest)
