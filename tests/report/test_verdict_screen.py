@@ -48,7 +48,7 @@ def test_the_answer_comes_first(content: ReportedComparison) -> None:
     assert found[0].startswith("alpha fine, as installed, dt 1e-3 s, is wrong: z is off by ")
     assert found[1].endswith(" engine settings agree.")
     assert found[2].startswith("Not as the file expects (1 of 2): ")
-    words = "matched: documented options; best in an answer: the cheaper of matched and tuned."
+    words = "matched: documented options; an answer's best: the cheaper of matched, tuned."
     assert found[3:5] == [f"as installed: the engine's own options; {words}", ""]
     assert found[5].split() == ["setting", "worst", "error", "of", "allowed", "real", "time"]
 

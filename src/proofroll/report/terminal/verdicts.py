@@ -98,7 +98,7 @@ def _presets_lines(presets: set[str | None]) -> Iterator[str]:
     """Line on the words for settings in the rows, in those of an answer; none without presets."""
     clauses = ["as installed: the engine's own options"] if "default" in presets else []
     if documented := " and ".join(name for name in ("matched", "tuned") if name in presets):
-        clauses.append(f"{documented}: documented options; best in an answer: the cheaper of matched and tuned")
+        clauses.append(f"{documented}: documented options; an answer's best: the cheaper of matched, tuned")
     yield from [f"{'; '.join(clauses)}."] if clauses else []
 
 
