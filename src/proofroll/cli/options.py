@@ -146,9 +146,7 @@ def _read_below(context: typer.Context, root: Path | None) -> Path | None:
 Root = Annotated[
     Path | None,
     typer.Option(
-        "--root",
-        help="Folder of what a robot file includes and its meshes; by default its own.",
-        callback=_read_below,
+        "--root", help="Folder of what a robot file includes and its meshes; by default its own.", callback=_read_below
     ),
 ]
 
