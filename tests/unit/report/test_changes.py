@@ -119,7 +119,9 @@ def test_costs_without_intervals_show_how_the_machine_scatters() -> None:
 
 def test_runs_that_are_gone_count_and_new_ones_do_not() -> None:
     """A run that is not made any more is a change; one that is new is told; other studies are left alone."""
-    assert [(item.kind, item.run) for item in held(LINES[:2]).changes] == [("gone", "beta joints as installed dt 1e-3 s")]
+    assert [(item.kind, item.run) for item in held(LINES[:2]).changes] == [
+        ("gone", "beta joints as installed dt 1e-3 s")
+    ]
     assert held(LINES[:2]).changed
     more = held([*LINES, replace(LINE, row=2, engine="gamma")])
     assert [item.kind for item in more.changes] == ["new"]
