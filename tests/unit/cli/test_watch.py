@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from proofroll.cli.watch import _written
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Refused
 from proofroll.files.data_folders import data_folder
 from proofroll.files.kept_runs import kept_lines, kept_path, run_file
 
@@ -33,6 +33,32 @@ def test_a_watched_scene_is_shown_beside_the_truth(proofroll: Proofroll, tmp_pat
     assert [line.rpartition(",")[0].partition(": ")[2] for line in err.splitlines()][-1].endswith(
         "mujoco, exudyn, truth"
     )
+
+
+@pytest.mark.drill
+def test_a_watched_scene_without_a_truth(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All engines are shown, and the page says why there is no truth."""
+
+    def refuse(*_: object) -> None:
+        raise Refused("no two routes cover it")
+
+    monkeypatch.setattr("proofroll.core.truth.truth", refuse)
+    page = tmp_path / "page.html"
+    words = [
+        "--engine",
+        "projection",
+        "--engine",
+        "projection[rtol=1e-6]",
+        "--until",
+        "0.1",
+        "--out",
+        str(page),
+        "--once",
+    ]
+    code, _, err = proofroll("watch", "pendulum", *words)
+    assert code == 0, err
+    assert err.splitlines()[-1].rpartition(",")[0].endswith("projection, projection")
+    assert "translucent: no two routes cover it." in page.read_text(encoding="utf-8")
 
 
 def test_a_saved_file_is_seen(tmp_path: Path) -> None:
