@@ -84,7 +84,7 @@ def answer_steps(
 
 
 def _change(made: StepAnswer) -> list[str]:
-    """The line of a person's own model that makes the step that would do, or the command that looks for other settings.
+    """The line of a person's own model that makes a confirmed step, or the command that looks for other settings.
 
     Empty where theirs is good enough.
     """
@@ -92,12 +92,13 @@ def _change(made: StepAnswer) -> list[str]:
     from proofroll.core.plugins import parse_engine
     from proofroll.report.answer.sentences import lines_command
     from proofroll.report.page.model_lines import own_lines
+    from proofroll.studies.answer.setting_search import State
 
     if made.holds or made.undecided:
         return []
     spec = parse_engine(made.advised.spec or made.spec)
     try:
-        lines = own_lines(spec.name, spec.options) if made.advised.holds else []
+        lines = own_lines(spec.name, spec.options) if made.advised.state is State.HOLDS else []
     except ProofrollError:
         lines = []
     changed = [f"Change this line: {line}" for line in lines if line.startswith("<option") or "numberOfSteps" in line]

@@ -62,8 +62,9 @@ def test_what_is_sound_fits_the_terminal(proofroll: Proofroll, monkeypatch: pyte
         (
             "four_bar",
             ("", ""),
-            ["freedom: 1; loops add 10 constraints", "rod0: centre of mass at (0, 0.5, 0) m"],
+            ["freedom: 1; 10 constraints of loops and couplings", "rod0: centre of mass at (0, 0.5, 0) m"],
         ),
+        ("gear_pair", ("", ""), ["freedom: 1; 1 constraint of loops and couplings\n"]),
         ("bricard", ("", ""), ["degrees of freedom: 1", "of which 1 follow from the others"]),
         ("double_pendulum", ("", ""), ["degrees of freedom: 2\n"]),
         ("cradle", ("", ""), ["gaps of pairs: hit 0.1 m, "]),

@@ -5,14 +5,20 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from invented_answers import BOUND, HELD
 from robot_templates import urdf
 
+from proofroll.cli.own_step import _change
 from proofroll.core.errors import InputError
 from proofroll.files.scene_sources import options_of
+from proofroll.studies.answer.records import StepAnswer
+from proofroll.studies.answer.setting_search import State
 from proofroll.studies.comparison.default_comparison import default_comparison
+from proofroll.studies.study_store import Measured
 
 Proofroll = Callable[..., tuple[int, str, str]]
 MODEL = "<mujoco><option {}/><worldbody><body><joint/><geom size='.1'/></body></worldbody></mujoco>"
@@ -52,6 +58,19 @@ def test_options_of_a_model_are_settings(model: Callable[[str], Path]) -> None:
     assert own.others == ["flag refsafe", "solreffriction of 1 joint"]
     with pytest.raises(InputError, match="integrator is none that can be compared; choose Euler, RK4, implicitfast"):
         options_of(model("integrator='implicit'"))
+
+
+def test_a_step_that_is_not_confirmed_is_no_line_to_change() -> None:
+    """Where the step that would do is not confirmed, the command that looks for other settings is proposed."""
+    advised = replace(HELD, spec="mujoco[formulation=joints,dt=1e-7]", state=State.UNCONFIRMED)
+    made = StepAnswer(
+        scene="pendulum", parameters={}, until=5.0, every=0.02, tolerance="1 mm", bounds=[BOUND], unjudged=[],
+        beyond="", open="", spec="mujoco[dt=0.002]", resolution="dt", step=2e-3, holds=False, luck="", bound=BOUND,
+        error=1.0, status="done", message="", reached=5.0, held_until=0.1, seconds_per_second=1 / 160,
+        advised=advised, spent=1.0, measured=Measured("2026", {}, {}, ""),
+    )  # fmt: skip
+    command = "proofroll recommend pendulum --engine mujoco --tolerance '1 mm' --until 5.0 --lines"
+    assert _change(made) == [f"Lines that do, if any: {command}"]
 
 
 def test_another_file_is_no_model(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.number_format import vector
+from proofroll.core.number_format import counted, vector
 from proofroll.elements.mechanism.contact.start import touches
 from proofroll.elements.mechanism.dynamics.kinematics import Tree
 from proofroll.elements.mechanism.dynamics.placed import Placed
@@ -33,7 +33,7 @@ def start_facts(element: MechanismElement) -> Sequence[str]:
     driven = len(mechanism.prescribed)
     if rows := analysis.rows - driven:
         repeated = f", of which {analysis.redundant} follow from the others" if analysis.redundant else ""
-        clauses[0] += f"; loops add {rows} constraints{repeated}"
+        clauses[0] += f"; {counted(rows, 'constraints')} of loops and couplings{repeated}"
     if driven:
         clauses[0] += f"; prescribed motions: {', '.join(joint.name for joint, _, _ in mechanism.prescribed)}"
     if analysis.singular_start:
