@@ -104,6 +104,13 @@ def about(axis: int, angle: Any) -> Array:
     return R
 
 
+def from_rotation_vector(turn: Array) -> Array:
+    """Rotations about the axes of vectors by their lengths, rad, shape (…, 3); shape (…, 3, 3)."""
+    K, angle = skews(turn), np.linalg.norm(turn, axis=-1)[..., None, None]
+    R: Array = _UNIT + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * K @ K
+    return R
+
+
 def from_rpy(rpy: ArrayLike) -> Array:
     """Rotation of roll, pitch, yaw about fixed axes x, y, z, rad (URDF's convention)."""
     roll, pitch, yaw = np.asarray(rpy, dtype=float)
@@ -143,6 +150,26 @@ def to_quaternion(R: Array) -> Array:
     K[..., 1:, 0] = (R[..., [2, 0, 1], [1, 2, 0]]) - R[..., [1, 2, 0], [2, 0, 1]]
     q: Array = np.linalg.eigh(K, UPLO="L")[1][..., -1]
     return np.where(q[..., :1] >= 0, q, -q)
+
+
+def quaternion_product(p: Array, q: Array) -> Array:
+    """Quaternions of turning first by ``q``, then by ``p``, shapes (…, 4)."""
+    w = p[..., :1] * q[..., :1] - (p[..., 1:] * q[..., 1:]).sum(axis=-1, keepdims=True)
+    v = p[..., :1] * q[..., 1:] + q[..., :1] * p[..., 1:] + np.cross(p[..., 1:], q[..., 1:])
+    return np.concatenate([w, v], axis=-1)
+
+
+def quaternion_of_vector(turn: Array) -> Array:
+    """Unit quaternions of rotation vectors, rad, shape (…, 3); shape (…, 4)."""
+    half = np.linalg.norm(turn, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.cos(half), np.sinc(half / np.pi) * turn / 2], axis=-1)
+
+
+def vector_of_quaternion(q: Array) -> Array:
+    """Rotation vectors of at most half a turn, rad, of unit quaternions, shape (…, 4); shape (…, 3)."""
+    q = np.where(q[..., :1] < 0, -q, q)
+    half = np.arctan2(np.linalg.norm(q[..., 1:], axis=-1, keepdims=True), q[..., :1])
+    return np.asarray(2 * q[..., 1:] / np.sinc(half / np.pi))
 
 
 def quaternion_from_z(axis: Sequence[float]) -> tuple[float, float, float, float]:
