@@ -10,8 +10,8 @@ import pinocchio as pin
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.contact.rolling_and_spin import largest_response, turning_frictions
 from proofroll.elements.mechanism.contact.touching import Touching
-from proofroll.elements.mechanism.run.contacts.step_events import SLIP, States
-from proofroll.elements.mechanism.scene.rotations import Array, skew
+from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, States
+from proofroll.elements.mechanism.scene.rotations import Array, minus, plus, scaled, skew
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
 # Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one:
@@ -25,13 +25,11 @@ class Pressed(NamedTuple):
     Attributes:
         v: velocities after it, (nv,).
         normal: impulse along the normal of each contact whose friction against turning acts [N s].
-        held: rows that its contacts hold at zero, (rows, nv).
         states: of all contacts.
     """
 
     v: Array
-    normal: Array
-    held: Array
+    normal: Sequence[float]
     states: States
 
 
@@ -67,12 +65,13 @@ class TurningImpulses:
         return rows
 
     def found(
-        self, rows: Array, v: Array, inverse: Array, pressed: Callable[[Array], Pressed], time: float
+        self, rows: Array, J: Array, v: Array, inverse: Array, pressed: Callable[[Array], Pressed], time: float
     ) -> tuple[Array, Array]:
         """Impulsive moments of all frictions [N m s], (frictions, 3), and the joint impulses that they are, (nv,).
 
         Args:
             rows: see :meth:`rows`.
+            J: see :meth:`rows`.
             v: joint velocities before the step.
             inverse: of the mass matrix.
             pressed: contacts for joint impulses of the moments.
@@ -81,24 +80,37 @@ class TurningImpulses:
         Raises:
             Diverged: the iterations do not settle.
         """
-        moments, impulses = np.zeros((len(self.frictions), 3)), np.zeros(len(v))
-        coefficients = np.array([friction.friction for friction in self.frictions])
-        eases = dict[tuple[int, bytes], float]()  # what is held is mostly the same in all solutions of a step
+        turning_rows, opposed_rows = rows.reshape(2, -1, len(v))
+        frees = ((turning_rows @ inverse) * turning_rows).sum(axis=1).reshape(-1, 3).sum(axis=1).tolist()
+        moments, before, impulses = [(0.0, 0.0, 0.0)] * len(frees), (opposed_rows @ v).tolist(), np.zeros(len(v))
+        eases = dict[tuple[int, States], float]()  # what is held is mostly the same in all solutions of a step
         for _ in range(_MOST):
-            outcome, last = pressed(impulses), moments.copy()
-            bounds, held = coefficients * outcome.normal, outcome.held.tobytes()
-            for k, (row, opposed, bound) in enumerate(zip(*rows, bounds.tolist(), strict=True)):
-                if (k, held) not in eases:
-                    ways = inverse @ row.T
-                    of_held = outcome.held @ inverse @ outcome.held.T
-                    eases[k, held] = largest_response(row @ ways, outcome.held @ ways, of_held)
-                if eases[k, held]:
-                    moments[k] -= row @ outcome.v / eases[k, held]
-                moves = self.frictions[k].bend and outcome.states[self.frictions[k].pressed_by] == SLIP
-                if moves or math.hypot(*moments[k].tolist()) > bound:
-                    turning = opposed @ (v + outcome.v)
-                    moments[k] = -bound * turning / (math.hypot(*turning.tolist()) or 1.0)
-            impulses = moments.ravel() @ rows[0].reshape(moments.size, -1)
-            if np.abs(moments - last).max() <= _SETTLED * self._tolerance * bounds.max():
-                return moments, impulses
+            outcome, last, moments = pressed(impulses), moments, [*moments]
+            turning, opposed = (turning_rows @ outcome.v).tolist(), (opposed_rows @ outcome.v).tolist()
+            bounds = [friction.friction * size for friction, size in zip(self.frictions, outcome.normal, strict=True)]
+            for k, (friction, bound) in enumerate(zip(self.frictions, bounds, strict=True)):
+                own, held = slice(3 * k, 3 * k + 3), (k, outcome.states)
+                moves = bool(friction.bend) and outcome.states[friction.pressed_by] == SLIP
+                # what turns faster is not stopped within the bound: contacts only lessen its response
+                moves = moves or math.hypot(*turning[own]) > frees[k] * (bound + math.hypot(*last[k]))
+                if not moves:
+                    if held not in eases:
+                        eases[held] = _ease(rows[0, k], J, inverse, outcome.states)
+                    if eases[held]:
+                        moments[k] = minus(last[k], scaled(1.0 / eases[held], turning[own]))
+                    moves = math.hypot(*moments[k]) > bound
+                if moves:
+                    direction = plus(before[own], opposed[own])
+                    moments[k] = scaled(-bound / (math.hypot(*direction) or 1.0), direction)
+            impulses = np.ravel(moments) @ turning_rows
+            change = max(map(abs, np.subtract(moments, last).ravel().tolist()))
+            if change <= _SETTLED * self._tolerance * max(bounds):
+                return np.array(moments), impulses
         raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")
+
+
+def _ease(row: Array, J: Array, inverse: Array, states: States) -> float:
+    """Largest response of a turning, (3, nv), while contacts hold what their states say; see :meth:`.found`."""
+    held = [J[k, 2:] if state == SLIP else J[k] for k, state in enumerate(states) if state != OPEN]
+    held_rows, ways = np.concatenate([J[:0, 0], *held]), inverse @ row.T
+    return largest_response(row @ ways, held_rows @ ways, held_rows @ inverse @ held_rows.T)
