@@ -100,7 +100,8 @@ class ImpulseSteps:
         ends = list(accumulate([*(3 + turns for turns in sharing.turns), *[1] * len(self.joints.J)], initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
         self._slides = [row for rows in self._rows[: len(self.contacts)] for row in rows[-3:]]
-        self._upper = np.triu(np.ones((nv, nv), dtype=bool))
+        numbers = np.arange(nv)
+        self._upper = np.minimum.outer(numbers, numbers) * nv + np.maximum.outer(numbers, numbers)
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
         try:
@@ -197,8 +198,7 @@ class ImpulseSteps:
         tau = tree.drives(q, v)
         rate = pin.aba(model, data, q, v, tau, pulls) if pulls else pin.aba(model, data, q, v, tau)
         free = v + span * rate
-        upper = pin.computeMinverse(model, data, q)
-        inverse = np.where(self._upper, upper, upper.T)
+        inverse = pin.computeMinverse(model, data, q).take(self._upper)  # of which it gives the upper half alone
         if len(tree.geared):
             free, inverse = self._driven(q, free, inverse, span, late)
         pin.computeJointJacobians(model, data, q)
@@ -356,14 +356,18 @@ class ImpulseSteps:
         kicks = list[Impulses]()
 
         def pressed(impulses: Array) -> Pressed:
-            free, at_free = terms.free + terms.inverse @ impulses, terms.at_free + impulses @ terms.into
-            kicks[:] = [kick := self._solved(terms._replace(free=free, at_free=at_free), shifts, span, convex=convex)]
+            moved = terms
+            if kicks:
+                free, at_free = terms.free + terms.inverse @ impulses, terms.at_free + impulses @ terms.into
+                moved = terms._replace(free=free, at_free=at_free)
+            kicks[:] = [kick := self._solved(moved, shifts, span, convex=convex)]
             sizes = [dot(touching[k].normal, kick.impulse[k]) if soft[k] else 0.0 for k in self._pressed_by]
             return Pressed(kick.v, sizes, kick.states)
 
         moments, impulses = self._moments.found(rows, J, v, terms.inverse, pressed, self.t)
         by_contact = kicks[0].moment.copy()
-        np.add.at(by_contact, self._pressed_by, moments)
+        for k, moment in zip(self._pressed_by, moments, strict=True):
+            by_contact[k] += moment
         driving = kicks[0].driving - self._motions[1].T @ impulses
         return kicks[0]._replace(moment=by_contact, driving=driving)
 
@@ -382,7 +386,7 @@ class ImpulseSteps:
         while True:
             closing = set[int]()
             for k in gaps:
-                of_row = [speeds[row] for row in own_rows[k]]
+                of_row = speeds[own_rows[k].start : own_rows[k].stop]
                 # a speed that is round-off of its rows would be the unit of impulses, in which slips are huge
                 if of_row[-1] + shifts[own_rows[k][-1]] < -_SMALL * max(map(abs, of_row)):
                     closing.add(k)
@@ -486,8 +490,9 @@ class ImpulseSteps:
             impulses = result.retrieveConstraintImpulses()
             sizes, narrow = impulses.tolist(), []
             for point, end, mu in points:
-                bound = point.getFriction() * sizes[end - 1]
-                if point.getFriction() < mu and math.hypot(*sizes[end - 3 : end - 1]) + least >= bound > least:
+                friction = point.getFriction()
+                bound = friction * sizes[end - 1]
+                if friction < mu and math.hypot(*sizes[end - 3 : end - 1]) + least >= bound > least:
                     narrow.append((point, mu))
             if not narrow:
                 return np.asarray(unit * impulses)

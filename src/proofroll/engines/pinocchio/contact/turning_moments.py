@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from operator import sub
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,8 @@ from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 # Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one:
 # what the iteration leaves is not seen beside what the solver leaves.
 _MOST, _SETTLED = 100, 1e-2
+# Cross product of a normal with a vector, in the frame whose last axis it is.
+_ACROSS = skew((0.0, 0.0, 1.0))
 
 
 class Pressed(NamedTuple):
@@ -61,7 +64,7 @@ class TurningImpulses:
             rows[0, k] = friction.resisted(normal, rows[0, k])
             rows[1, k] = rows[0, k]
             if friction.bend:
-                rows[1, k] += friction.bend * skew(normal) @ frames[friction.pressed_by] @ J[friction.pressed_by]
+                rows[1, k] += friction.bend * frames[friction.pressed_by] @ _ACROSS @ J[friction.pressed_by]
         return rows
 
     def found(
@@ -80,32 +83,32 @@ class TurningImpulses:
         Raises:
             Diverged: the iterations do not settle.
         """
-        turning_rows, opposed_rows = rows.reshape(2, -1, len(v))
+        both, count = rows.reshape(-1, len(v)), 3 * len(self.frictions)
+        turning_rows, before = both[:count], (both[count:] @ v).tolist()
         frees = ((turning_rows @ inverse) * turning_rows).sum(axis=1).reshape(-1, 3).sum(axis=1).tolist()
-        moments, before, impulses = [(0.0, 0.0, 0.0)] * len(frees), (opposed_rows @ v).tolist(), np.zeros(len(v))
+        moments, impulses = [0.0] * count, np.zeros(len(v))
         eases = dict[tuple[int, States], float]()  # what is held is mostly the same in all solutions of a step
         for _ in range(_MOST):
             outcome, last, moments = pressed(impulses), moments, [*moments]
-            turning, opposed = (turning_rows @ outcome.v).tolist(), (opposed_rows @ outcome.v).tolist()
+            rates = (both @ outcome.v).tolist()
             bounds = [friction.friction * size for friction, size in zip(self.frictions, outcome.normal, strict=True)]
             for k, (friction, bound) in enumerate(zip(self.frictions, bounds, strict=True)):
                 own, held = slice(3 * k, 3 * k + 3), (k, outcome.states)
                 moves = bool(friction.bend) and outcome.states[friction.pressed_by] == SLIP
                 # what turns faster is not stopped within the bound: contacts only lessen its response
-                moves = moves or math.hypot(*turning[own]) > frees[k] * (bound + math.hypot(*last[k]))
+                moves = moves or math.hypot(*rates[own]) > frees[k] * (bound + math.hypot(*last[own]))
                 if not moves:
                     if held not in eases:
                         eases[held] = _ease(rows[0, k], J, inverse, outcome.states)
                     if eases[held]:
-                        moments[k] = minus(last[k], scaled(1.0 / eases[held], turning[own]))
-                    moves = math.hypot(*moments[k]) > bound
+                        moments[own] = minus(last[own], scaled(1.0 / eases[held], rates[own]))
+                    moves = math.hypot(*moments[own]) > bound
                 if moves:
-                    direction = plus(before[own], opposed[own])
-                    moments[k] = scaled(-bound / (math.hypot(*direction) or 1.0), direction)
-            impulses = np.ravel(moments) @ turning_rows
-            change = max(map(abs, np.subtract(moments, last).ravel().tolist()))
-            if change <= _SETTLED * self._tolerance * max(bounds):
-                return np.array(moments), impulses
+                    direction = plus(before[own], rates[count:][own])
+                    moments[own] = scaled(-bound / (math.hypot(*direction) or 1.0), direction)
+            impulses = np.array(moments) @ turning_rows
+            if max(map(abs, map(sub, moments, last))) <= _SETTLED * self._tolerance * max(bounds):
+                return np.array(moments).reshape(-1, 3), impulses
         raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")
 
 
