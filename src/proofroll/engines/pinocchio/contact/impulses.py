@@ -353,23 +353,20 @@ class ImpulseSteps:
         if not all(soft):  # a curved wall turns away from a fast ball
             turning = self._turning(q, v, terms, span)
             soft = [a >= soft_speed - _SOFT * abs(bend) for a, (_, _, bend) in zip(approach, turning, strict=True)]
-        kicks = list[Impulses]()
 
         def pressed(impulses: Array) -> Pressed:
             moved = terms
-            if kicks:
+            if impulses.any():
                 free, at_free = terms.free + terms.inverse @ impulses, terms.at_free + impulses @ terms.into
                 moved = terms._replace(free=free, at_free=at_free)
-            kicks[:] = [kick := self._solved(moved, shifts, span, convex=convex)]
-            sizes = [dot(touching[k].normal, kick.impulse[k]) if soft[k] else 0.0 for k in self._pressed_by]
-            return Pressed(kick.v, sizes, kick.states)
+            kick = self._solved(moved, shifts, span, convex=convex)
+            return kick, [dot(touching[k].normal, kick.impulse[k]) if soft[k] else 0.0 for k in self._pressed_by]
 
-        moments, impulses = self._moments.found(rows, J, v, terms.inverse, pressed, self.t)
-        by_contact = kicks[0].moment.copy()
+        kick, moments, impulses = self._moments.found(rows, J, v, terms.inverse, pressed, self.t)
+        by_contact = kick.moment.copy()
         for k, moment in zip(self._pressed_by, moments, strict=True):
             by_contact[k] += moment
-        driving = kicks[0].driving - self._motions[1].T @ impulses
-        return kicks[0]._replace(moment=by_contact, driving=driving)
+        return kick._replace(moment=by_contact, driving=kick.driving - self._motions[1].T @ impulses)
 
     def _solved(self, terms: StepTerms, shifts: Sequence[float], span: float, *, convex: bool) -> Impulses:
         """Impulses of dry friction and of all contacts and stops that would close, also due to other impulses."""

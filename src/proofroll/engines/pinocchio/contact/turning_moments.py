@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from operator import sub
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -13,6 +12,7 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import largest_respon
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, States
 from proofroll.elements.mechanism.scene.rotations import Array, minus, plus, scaled, skew
+from proofroll.engines.pinocchio.contact.step_terms import Impulses
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
 # Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one:
@@ -22,18 +22,7 @@ _MOST, _SETTLED = 100, 1e-2
 _ACROSS = skew((0.0, 0.0, 1.0))
 
 
-class Pressed(NamedTuple):
-    """Outcome of the contacts of a step for given moments.
-
-    Attributes:
-        v: velocities after it, (nv,).
-        normal: impulse along the normal of each contact whose friction against turning acts [N s].
-        states: of all contacts.
-    """
-
-    v: Array
-    normal: Sequence[float]
-    states: States
+Pressed = tuple[Impulses, list[float]]  # impulses of the contacts, and normal one of each friction that acts [N s]
 
 
 class TurningImpulses:
@@ -69,15 +58,15 @@ class TurningImpulses:
 
     def found(
         self, rows: Array, J: Array, v: Array, inverse: Array, pressed: Callable[[Array], Pressed], time: float
-    ) -> tuple[Array, Array]:
-        """Impulsive moments of all frictions [N m s], (frictions, 3), and the joint impulses that they are, (nv,).
+    ) -> tuple[Impulses, Array, Array]:
+        """Impulses beside those of all frictions [N m s], (frictions, 3), and the joint impulses that these are, (nv,).
 
         Args:
             rows: see :meth:`rows`.
             J: see :meth:`rows`.
             v: joint velocities before the step.
             inverse: of the mass matrix.
-            pressed: contacts for joint impulses of the moments.
+            pressed: gives the contacts for joint impulses of the moments.
             time: for messages [s].
 
         Raises:
@@ -89,9 +78,9 @@ class TurningImpulses:
         moments, impulses = [0.0] * count, np.zeros(len(v))
         eases = dict[tuple[int, States], float]()  # what is held is mostly the same in all solutions of a step
         for _ in range(_MOST):
-            outcome, last, moments = pressed(impulses), moments, [*moments]
+            (outcome, normal), last, moments = pressed(impulses), moments, [*moments]
             rates = (both @ outcome.v).tolist()
-            bounds = [friction.friction * size for friction, size in zip(self.frictions, outcome.normal, strict=True)]
+            bounds = [friction.friction * size for friction, size in zip(self.frictions, normal, strict=True)]
             for k, (friction, bound) in enumerate(zip(self.frictions, bounds, strict=True)):
                 own, held = slice(3 * k, 3 * k + 3), (k, outcome.states)
                 moves = bool(friction.bend) and outcome.states[friction.pressed_by] == SLIP
@@ -108,7 +97,7 @@ class TurningImpulses:
                     moments[own] = scaled(-bound / (math.hypot(*direction) or 1.0), direction)
             impulses = np.array(moments) @ turning_rows
             if max(map(abs, map(sub, moments, last))) <= _SETTLED * self._tolerance * max(bounds):
-                return np.array(moments).reshape(-1, 3), impulses
+                return outcome, np.array(moments).reshape(-1, 3), impulses
         raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")
 
 
