@@ -21,14 +21,7 @@ from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import time_in_rounds
 from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion
-from proofroll.studies.answer.records import (
-    AllowedError,
-    EngineAnswer,
-    SceneAnswer,
-    SettingTried,
-    StepTried,
-    ranked,
-)
+from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, SettingTried, StepTried, ranked
 from proofroll.studies.answer.search import (
     EngineSearch,
     SearchesAbreast,
