@@ -15,7 +15,7 @@ from proofroll.running.integrity import watch
 from proofroll.running.program import engine, path_of
 
 # Scenes that a process keeps, as most cases are of few.
-_SCENES = 8
+_SCENES = 32
 # Place that this process serves: the part after ``@`` of its engines; empty: engines of this interpreter.
 _settled = ""
 # True in a worker: engines of other packages are watched there.

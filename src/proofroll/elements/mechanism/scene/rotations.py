@@ -191,9 +191,10 @@ def quaternion_rate(q: Any, w: Any) -> Array:
 
 def carried(vector: Array, start: Array, end: Array) -> Array:
     """A vector turned by the smallest rotation that takes a unit vector to another one less than a half turn away."""
-    axis = cross(start, end)
-    across = cross(axis, vector)
-    return np.asarray(vector + across + cross(axis, across) / (1.0 + start @ end))
+    axis = plain_cross(start.tolist(), end.tolist())
+    across = plain_cross(axis, vector.tolist())
+    back = scaled(1.0 / (1.0 + dot(start, end)), plain_cross(axis, across))
+    return np.array(plus(plus(vector.tolist(), across), back))
 
 
 def frame_of_axis(z: ArrayLike, x: ArrayLike | None = None) -> Array:
