@@ -119,6 +119,19 @@ def test_elimination_keeps_loops_closed():
     assert gaps[False] > 1e-8
 
 
+@pytest.mark.parametrize("scene", ["bricard", "spatial_slider_crank", "slider_crank"])
+def test_rows_without_velocities_are_those_of_the_pose(scene):
+    """What elimination reads of loops is what the accelerations read, but for the drifts, which are zero at rest."""
+    tree = JointTree(runs.model(scene))
+    rows, data, q = LoopRows(tree), tree.model.createData(), tree.q0
+    moving, still = rows.at(data, q, tree.v0 + 1.0), rows.at(data, q, None)
+    for name in ("residual", "C", "force", "torque"):
+        np.testing.assert_array_equal(getattr(moving, name), getattr(still, name))
+    assert np.abs(moving.drift).max() > 0.1
+    at_rest = rows.at(data, q, 0.0 * tree.v0)
+    np.testing.assert_array_equal(still.drift[: len(still.loop)], at_rest.drift[: len(at_rest.loop)])
+
+
 @pytest.mark.parametrize(("engine", "formulation"), [("projection", "dependent"), ("pinocchio", "null_space")])
 def test_a_step_that_is_far_too_long_is_told(engine, formulation):
     """A spinning body that a fixed step cannot follow ends with Diverged, not with a state that is not finite."""
