@@ -15,6 +15,7 @@ from scipy.special import gammaincc
 from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.number_format import error, with_bar
+from proofroll.elements.mechanism.dynamics.linear_balance import body_numbers
 from proofroll.robots.control.air_rows import (
     BY_JOINT,
     NUMBERS,
@@ -198,9 +199,8 @@ def _carried(rows: AirRows) -> list[LayerCause]:
 
 def _point(numbers: Array) -> Array:
     """Mass, first moment and inertia (xx, yy, zz, xy, xz, yz) of a point of a mass with a first moment."""
-    m, (x, y, z) = numbers[0], numbers[1:]
-    xx, yy, zz, xy, xz, yz = np.array([x * x, y * y, z * z, x * y, x * z, y * z]) / (m or np.inf)
-    return np.array([m, x, y, z, yy + zz, xx + zz, xx + yy, -xy, -xz, -yz])
+    mass, com = numbers[:1], numbers[None, 1:] / (numbers[0] or np.inf)
+    return np.array([*numbers, *body_numbers(mass, com, np.zeros((1, 3, 3)))[0, 4:]])
 
 
 def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -> str:

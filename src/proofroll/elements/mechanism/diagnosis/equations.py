@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.pressing import SCENES_LAW, ContactLimits, Pressing, Resisting, pressing
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Tree
+from proofroll.elements.mechanism.dynamics.linear_balance import BodyColumns, body_numbers, forces_of, joint_columns
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.point_loads import PointLoad, applied_loads, bushing_loads, spring_loads
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
@@ -30,7 +31,6 @@ from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.parts import Spring
-from proofroll.elements.mechanism.scene.rotations import skews
 from proofroll.elements.mechanism.scene.signal import breaks, value_at
 
 _FITS = ((7, 5), (5, 3))
@@ -61,6 +61,22 @@ class MechanismState:
     v: FloatArray
     motion: BodyMotion
     acceleration: FloatArray
+
+    @cached_property
+    def bodies(self) -> BodyColumns:
+        """Columns of numbers of the bodies."""
+        return BodyColumns(self.motion.R_WB[:-1], self.motion.w_WB[:-1], self.motion.J[:-1])
+
+    @cached_property
+    def columns(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Forces that numbers of the bodies need by accelerations and by spin, and their momenta, (bodies, nv, 10)."""
+        moved = self.bodies.moved(self.acceleration[:, :3], self.acceleration[:, 3:])
+        return moved, self.bodies.spun(), self.bodies.moved(self.motion.v_WB[:-1], self.motion.w_WB[:-1])
+
+    def masses(self, numbers: FloatArray) -> FloatArray:
+        """Mass matrix for numbers of the bodies, (nv, nv)."""
+        J = np.moveaxis(self.bodies.J, 2, 0)
+        return forces_of(self.bodies.moved(J[..., :3], J[..., 3:]), numbers)
 
 
 class MechanismStates:
@@ -235,47 +251,37 @@ class Change:
     def balance(self, states: MechanismStates, i: int) -> FloatArray:
         """Inertial forces, applied forces, and the sum of sizes of their terms, along each velocity, (3, nv)."""
         m, state, mechanism = states.mechanism, states.each[i], self.mechanism
-        motion, n = state.motion, len(m.bodies)
-        mass = np.array([b.mass for b in mechanism.bodies]) if self.mass is None else self.mass
-        com = np.array([b.com for b in mechanism.bodies]) if self.com is None else self.com
-        inertias = np.array([b.inertia for b in mechanism.bodies]) if self.inertia is None else self.inertia
+        mass, com, inertia = (
+            np.array([getattr(body, name) for body in mechanism.bodies]) if value is None else value
+            for name, value in (("mass", self.mass), ("com", self.com), ("inertia", self.inertia))
+        )
         g = np.array(mechanism.gravity) if self.gravity is None else self.gravity
-        R, w = motion.R_WB[:n], motion.w_WB[:n]
-        arm = np.einsum("nij,nj->ni", R, com)
-        inertia = R @ inertias @ R.transpose(0, 2, 1)
-        J = motion.J[:n].copy()
-        J[:, :3] -= skews(arm) @ J[:, 3:]
-        alpha = state.acceleration[:, 3:]
-        at_com = state.acceleration[:, :3] + cross(alpha, arm) + cross(w, cross(w, arm))
-        spinning = np.einsum("nij,nj->ni", inertia, w)
-        spin = cross(w, spinning) * self.gyroscopic
-        force, moment = mass[:, None] * at_com, np.einsum("nij,nj->ni", inertia, alpha)
-        terms = [np.einsum("nij,ni->j", J[:, :3], force)]
-        terms += [np.einsum("nij,ni->j", J[:, 3:], item) for item in (moment, spin)]
-        carries = motion.J[:n, :3] if self.weight_at_origin else J[:, :3]
-        acts = np.einsum("nij,ni->j", carries, mass[:, None] * g)
-        by_v = [joint for joint in mechanism.joints for _ in range(joint.nv)]
-        rate = states.v_rates[i]
-        terms.append((self.armature * np.array([j.armature for j in by_v]) + self.added_armature) * rate)
+        none = np.zeros_like(inertia)
+        points, turning = body_numbers(mass, com, none), body_numbers(0 * mass, com, inertia)
+        hung = body_numbers(mass, 0 * com, none) if self.weight_at_origin else points
+        moved, spun, momenta = state.columns
+        terms = [forces_of(moved + spun, points), forces_of(moved, turning), self.gyroscopic * forces_of(spun, turning)]
         if self.coupling is not None:
-            weighted = np.concatenate([mass[:, None, None] * J[:, :3], inertia @ J[:, 3:]], axis=1)
-            M = J.reshape(-1, m.nv).T @ weighted.reshape(-1, m.nv)
-            terms.append(-(M * self.coupling) @ rate)
-        acts = acts + self.torque * np.array([float(value_at(j.torque, state.t)) for j in by_v])
-        acts = acts - self.friction * np.array([j.friction for j in by_v]) * np.sign(state.v)
-        momenta = mass[:, None] * (motion.v_WB[:n] + cross(w, arm)), spinning
-        for lost, carried, momentum in zip(self.decay, (J[:, :3], J[:, 3:]), momenta, strict=True):
-            acts = acts - lost * np.einsum("nij,ni->j", carried, momentum)
+            terms.append(-(state.masses(points + turning) * self.coupling) @ states.v_rates[i])
+        acts = forces_of(state.bodies.moved(np.broadcast_to(g, com.shape), 0 * com), hung)
+        for lost, numbers in zip(self.decay, (points, turning), strict=True):
+            acts = acts - lost * forces_of(momenta, numbers)
         acts = acts + states.pressing(i, self.resisting).known
         for actuator in mechanism.actuators:
             at_one, rated = m.place_of(actuator.joint)
             acts[rated] += self.effort(actuator, state.t, float(state.q[at_one]), float(state.v[rated]))
-        acts = acts - (self.damping * np.array([j.damping for j in by_v]) + self.added_damping) * state.v
+        stretched, by_v = np.zeros(m.nv), [joint for joint in mechanism.joints for _ in range(joint.nv)]
         for joint, at_q, at_v in zip(mechanism.joints, m.q_slices, m.v_slices, strict=True):
             if joint.stiffness:
-                acts[at_v] -= self.stiffness * joint.stiffness * (state.q[at_q] - joint.rest)
+                stretched[at_v] = state.q[at_q] - joint.rest
+        columns = joint_columns(stretched, state.v, states.v_rates[i], np.sign(state.v))
+        for law, column in columns.items():
+            of_joints = np.array([float(value_at(getattr(joint, law), state.t)) for joint in by_v])
+            columns[law] = (getattr(self, law) * of_joints + getattr(self, f"added_{law}", 0.0)) * column
+        terms.append(-columns.pop("armature"))
+        acts = acts + sum(columns.values())
         for factor, load in self._point_loads(state):
-            acts = acts + factor * load.along(motion)
+            acts = acts + factor * load.along(state.motion)
         return np.array([sum(terms), acts, sum(map(np.abs, terms)) + np.abs(acts)])
 
     def _point_loads(self, state: MechanismState) -> Iterator[tuple[float, PointLoad]]:
