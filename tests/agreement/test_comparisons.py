@@ -101,7 +101,7 @@ def outcomes(store: Store) -> Callable[[Comparison, Row], Outcome]:
 
 
 @pytest.mark.one_in(4)
-@pytest.mark.nightly_of("paper")
+@pytest.mark.nightly_of("paper", "accuracy", "four_bar")
 @pytest.mark.drill
 @pytest.mark.parametrize("name", comparison_names())
 def test_each_engine_begins(name: str, tmp_path: Path) -> None:

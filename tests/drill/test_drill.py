@@ -71,7 +71,7 @@ def place() -> Iterator[tuple[Site, Path]]:
         yield here, prepare(here)
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_damage_that_is_not_noticed(place: tuple[Site, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """A store that believes whatever it finds does not pass."""
 

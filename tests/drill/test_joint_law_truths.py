@@ -229,6 +229,7 @@ SCENES: dict[str, tuple[Callable[[Mapping[str, float]], Motion], float, Callable
 
 
 @pytest.mark.one_in(3)
+@pytest.mark.nightly_of("flyball_governor-0")
 @pytest.mark.drill
 @pytest.mark.parametrize(("name", "seed"), [(name, 2 * (place % 2)) for place, name in enumerate(SCENES)])
 def test_truths_agree_with_an_independent_solver(name: str, seed: int) -> None:

@@ -23,7 +23,7 @@ _CASES = [
 ]
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(6)
 @pytest.mark.drill
 @pytest.mark.parametrize("fault", _CASES)
 def test_a_shared_fault_is_not_silent(fault: LawFault) -> None:

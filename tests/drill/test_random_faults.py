@@ -34,7 +34,7 @@ def test_another_event_is_silent() -> None:
     assert compared(right, right | {"time": (PLACES[:2], 0.0)}).kind == "silent"
 
 
-@pytest.mark.drill
+@pytest.mark.nightly
 def test_a_draw_hangs_on_nothing_that_ran_before() -> None:
     """Functions of a scene are the same ones after this process has read it and found its truth."""
     before = functions_of("bouncing_ball")

@@ -142,7 +142,7 @@ def band_of(about: str) -> dict[str, str]:
 
 
 @pytest.mark.drill
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(8)
 @pytest.mark.drill_of("loop-3 ms early")
 @pytest.mark.parametrize(("about", "lie"), LIES)
 def test_a_lie(about: str, lie: Lie) -> None:

@@ -1,4 +1,4 @@
-"""A share of the cases of a test, spread over all; as a plug-in of pytest it leaves two of three cases to the night.
+"""A share of the cases of a test, spread over all; as a plug-in of pytest it leaves four of five cases to the night.
 
 As a plug-in it serves tests of packages, which know no marks of this repository: ``pytest -p share``.
 """
@@ -12,7 +12,7 @@ import pytest
 # Golden ratio, without its whole part.
 _GOLDEN = (5**0.5 - 1) / 2
 # Of how many cases of a package's test one runs before a change lands.
-_COUNT = 3
+_COUNT = 5
 
 
 def is_of_the_day(place: int, count: int) -> bool:

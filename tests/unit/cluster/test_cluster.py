@@ -92,8 +92,12 @@ class DaskCluster:
             )
         self.processes: list[int] = []
         self.scheduler = self._start("scheduler", "--port", "0", "--no-dashboard")
-        until(self._file.exists)
+        until(self._announced)
         self.address = json.loads(self._file.read_text())["address"]
+
+    def _announced(self) -> bool:
+        """True once the scheduler has written its file to the end."""
+        return self._file.exists() and self._file.read_text().rstrip().endswith("}")
 
     def worker(self) -> int:
         """One more worker of one thread."""

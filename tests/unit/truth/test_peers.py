@@ -24,7 +24,7 @@ ROOTS = np.array([-14.0783896927982, -0.3228664296, -0.7753418818 - 4.4648677130
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.nightly_of("bricard", "babyboot", "pushed_box", "andrews_squeezer")
+@pytest.mark.nightly_of("bricard", "babyboot", "pushed_box", "andrews_squeezer", "bicycle", "driven_four_bar")
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=MARKS[name in NIGHTLY]) for name in tables()]
 )

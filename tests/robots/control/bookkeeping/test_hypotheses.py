@@ -42,20 +42,14 @@ def _controlled(change: Callable[[Control], Control]) -> Callable[[Mechanism], M
     return changed
 
 
-@pytest.mark.nightly_of("<lambda>-default-None")
-@pytest.mark.drill
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("change", "preset", "said"),
     [
         (lambda mechanism: mechanism, "default", None),
         (_controlled(_with(delay=1)), "matched", "targets act one instant late"),
-        pytest.param(
-            _controlled(_with(scale=0.61 * 0.5)),
-            "default",
-            "the scale of actions is 0.61",
-            marks=pytest.mark.nightly,
-        ),
-        pytest.param(_servos(kd=0.7), "matched", "kd is 0.7 of the right one", marks=pytest.mark.nightly),
+        (_controlled(_with(scale=0.61 * 0.5)), "default", "the scale of actions is 0.61"),
+        (_servos(kd=0.7), "matched", "kd is 0.7 of the right one"),
     ],
 )
 def test_a_comparison_names_a_mistake_in_a_loop(

@@ -41,8 +41,8 @@ def leaning_rod(lean: float, friction: float, turn: Rotation) -> Mechanism:
 
 
 @pytest.mark.one_in(3)
+@pytest.mark.nightly_of("0.9-0.2-0.3-0")
 @pytest.mark.drill
-@pytest.mark.drill_of("0.1-0.3-0.9-0")
 @ONE_TURN
 @pytest.mark.parametrize(("lean", "friction", "until"), [(0.9, 0.2, 0.3), (0.1, 0.3, 0.9)])
 def test_a_turned_planar_contact_keeps_its_motion_its_events_and_its_bars(
