@@ -6,8 +6,8 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import gammaincc
@@ -30,6 +30,7 @@ from proofroll.robots.control.air_rows import (
 )
 from proofroll.robots.control.bookkeeping.air import AirRobot, HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.differences import instant_rows, servo_rows
 from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, LayerCause
 from proofroll.robots.model import Array
 
@@ -45,6 +46,8 @@ _CHANCE, _BARS = 1e-3, 3.0  # chance of a number that is told and is not there; 
 _EACH = 2  # equations for each number at least
 _SPREAD = 5.0  # standard deviations of a sum of squares within which numbers leave as little as all of them do
 _CLEAR, _SHARE = 10.0, 0.03  # least part of a number's forces that no others make: what is left of less is their noise
+# Number of a joint, or of its servo -> what it is called, and its unit.
+_OF_JOINTS = {**BY_JOINT, "kp": ("kp of more by", "N m/rad or N/m"), "kd": ("kd of more by", "N m s/rad or N s/m")}
 _REST = "torque"  # number of a joint that a spring needs, too: its rest is not known
 
 
@@ -124,7 +127,7 @@ def _close(groups: Sequence[_Group], rows: AirRows) -> bool:
 def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
     """Groups of numbers: of the whole robot, of all joints, of springs with their rest, and of each link."""
     for name in NUMBERS:
-        if rows.columns[name].any():
+        if name in rows.columns and rows.columns[name].any():
             yield _Group(name, rows.columns[name][:, None], ("",))
     for name, columns in rows.by_joint.items():
         rests = [rows.by_joint[_REST]] if name == "stiffness" else []
@@ -219,7 +222,7 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
         return f"{words} {text} ± {interval} {unit}"
     count = len(values) if group.kind != "stiffness" else len(values) // 2
     beyond = [k for k in beyond if k < count]
-    words, unit = BY_JOINT[group.kind]
+    words, unit = _OF_JOINTS[group.kind]
     even = 1 < len(beyond) == count and np.ptp(values[:count]) <= 2 * bars[:count].max()
     if not beyond:
         return ""
@@ -233,7 +236,25 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
     return f"joints have {words} {', '.join(texts)}{more} {unit} that is not told"
 
 
-def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: float) -> Layer | None:
+class WhiteNoise(NamedTuple):
+    """White noise of a record.
+
+    Attributes:
+        record: without most of it.
+        part: its largest part of the range of a column.
+        smooth: what smooths columns.
+        width: rows that are smoothed together.
+        kept: part of a variance that smoothing leaves.
+    """
+
+    record: ControlRecord
+    part: float
+    smooth: Callable[[Array], Array]
+    width: int
+    kept: float
+
+
+def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: str) -> Layer | None:
     """Layer of accelerations that white noise hides, with the numbers beyond their bars; None: no such noise.
 
     Smoothing is linear. So the balance of forces holds between smoothed columns, too, as far as the masses change
@@ -243,44 +264,95 @@ def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: fl
         record: of states and efforts.
         law: the law as it should be.
         held: the robot.
-        off: part of the forces that the right numbers leave without smoothing.
+        off: clause on what the right numbers leave without smoothing.
     """
-    if (smoothed := _smoothed(record)) is None:
+    if (white := white_noise(record)) is None:
         return None
-    record, noise, smooth, width = smoothed
-    robot, efforts = AirRobot.bare(held.mechanism, law), record.stacked("effort", law.joints)
-    if isinstance(motion := motion_of(record, robot), str) or efforts is None:
+    robot, efforts = AirRobot.bare(held.mechanism, law), white.record.stacked("effort", law.joints)
+    if isinstance(motion := motion_of(white.record, robot), str) or efforts is None:
         return None
     states, moving = motion
-    table = AirTable(record, law, robot, states, efforts, held.links)
-    table.signs = smooth(table.signs)
-    instants: Any = np.arange(width, len(states) - width, width)
+    table = AirTable(white.record, law, robot, states, efforts, held.links)
+    table.signs = white.smooth(table.signs)
+    instants: Any = np.arange(white.width, len(states) - white.width, white.width)
     try:
         rows = table.rows(instants, moving[0], StepScheme(), central=True)
-        lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts of other instants
-        rows, groups = _moving(rows.changed(lambda values: values - np.multiply.outer(lag, lag @ values)), law.joints)
-        others = _columns([group for group in groups if group.kind != "effort"])
-        count = int(np.linalg.matrix_rank(_scaled(others)[0], ROUND_OFF))
-        if len(rows.left) < _EACH * count:
-            return None
+    except (Diverged, Refused):
+        return None
+    lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts of other instants
+    rows, _ = _moving(rows.changed(lambda values: values - np.multiply.outer(lag, lag @ values)), law.joints)
+    return _hidden("acceleration", rows, law, white, off)
+
+
+def noisy_efforts(record: ControlRecord, law: ControlLaw) -> Layer | None:
+    """Layer of efforts that white noise of states and efforts hides, with the gains beyond their bars.
+
+    None: there is no such noise, or it does not explain what efforts are off by.
+    """
+    recorded, servos, white = record.stacked("effort", law.joints), servo_rows(record, law), white_noise(record)
+    if recorded is None or isinstance(servos, str) or white is None:
+        return None
+    target, q, v, known = servos
+    every: Any = instant_rows(record, law) if law.hold_effort else np.flatnonzero(known)
+    free = np.abs(law.kp * (target - q) - law.kd * v) < law.limit
+    parts = (recorded - law.effort(target, q, v), free * (target - q), -v * free, free, law.kp * (target - q))
+    raw = np.stack([np.asarray(item, float)[every] for item in parts])
+    level = np.sqrt(white.kept / _OF_DIFFERENCES) * np.diff(raw[0], _DEGREE, axis=0).std(axis=0)
+    left, *columns, acting = (white.smooth(item)[white.width : -white.width : white.width] for item in raw)
+    joints = np.eye(len(law.joints))
+    by_joint = {
+        name: (item[..., None] * joints).reshape(-1, len(joints))
+        for name, item in zip(("kp", "kd", "torque"), columns, strict=True)
+        if item.any()
+    }
+    whole, none = np.ravel(left), np.zeros(left.size)
+    rows = AirRows(
+        left=whole,
+        columns={},
+        by_joint=by_joint,
+        added={},
+        rounding=0.0,
+        late=none,
+        size=rms(acting),
+        slow=none > 0,
+        freedoms=len(joints),
+    )
+    rest = _solved(np.concatenate([*by_joint.values()], axis=1), whole)[1].reshape(left.shape)
+    if not np.all(rest.std(axis=0) <= level * (1 + _WHITE / math.sqrt(len(left)))):
+        return None
+    return _hidden("effort", rows, law, white, f"efforts are off by {error(float(np.abs(raw[0]).max()))}")
+
+
+def _hidden(name: str, rows: AirRows, law: ControlLaw, white: WhiteNoise, off: str) -> Layer | None:
+    """Layer that white noise hides, with the numbers beyond their bars; None: too few rows, or more than noise is left.
+
+    ``off``: clause on what it is off by.
+    """
+    others = _columns([group for group in _groups(rows, law.joints) if group.kind != "effort"])
+    count = int(np.linalg.matrix_rank(_scaled(others)[0], ROUND_OFF))
+    if len(rows.left) < _EACH * count:
+        return None
+    try:
         rows = _in_noise(rows, _solved(others, rows.left)[1], count)
-    except (Diverged, Refused, np.linalg.LinAlgError):  # the last: along a direction there is no noise
+    except np.linalg.LinAlgError:  # along a direction there is no noise
         return None
     if (chosen := _beyond_chance(rows, law.joints, count)) is None:
         return None
     columns = _columns(chosen) if chosen else np.zeros((len(rows.left), 0))
     causes = tuple(_told(rows, chosen, columns, _solved(columns, rows.left)[0], right_numbers(law)))
-    told = f"white noise of up to {error(100 * noise, 1)} % of a range, smoothed over {width} rows, explains it"
+    told = (
+        f"white noise of up to {error(100 * white.part, 1)} % of a range, smoothed over {white.width} rows, explains it"
+    )
     numbers = "these numbers alone are" if causes else "no number is"
-    reason = f"the forces are off by {error(off)} of the largest; {told}, and {numbers} off by more than their bars"
-    return Layer("acceleration", reason=reason, causes=causes, undecided=True, noise=noise)
+    reason = f"{off}; {told}, and {numbers} off by more than their bars"
+    return Layer(name, reason=reason, causes=causes, undecided=True, noise=white.part)
 
 
-def _smoothed(record: ControlRecord) -> tuple[ControlRecord, float, Callable[[Array], Array], int] | None:
-    """The record without most of its noise, the noise in parts of a range, what smooths, and its number of rows.
+@lru_cache(maxsize=4)
+def white_noise(record: ControlRecord) -> WhiteNoise | None:
+    """White noise of states and efforts; None: they have other noise, or none.
 
-    The widest smoothing counts that takes away no more of any column than white noise. None: even the narrowest does,
-    or there is no noise.
+    The widest smoothing counts that takes away no more of any column than white noise.
     """
     kinds = ("q.", "v.", "effort.", *(f"{name}." for name in BASE))
     columns = {name: item for name, item in record.columns.items() if name.startswith(kinds) and np.ptp(item) > 0}
@@ -288,18 +360,22 @@ def _smoothed(record: ControlRecord) -> tuple[ControlRecord, float, Callable[[Ar
         return None
     values = np.stack([*columns.values()], axis=1)
     ranges = np.ptp(values, axis=0)
+    least = np.maximum(
+        _QUIET * ranges, [record.rounding[name].max() if name in record.rounding else 0.0 for name in columns]
+    )
     noise = np.sqrt(np.mean(np.diff(values, _DEGREE, axis=0) ** 2, axis=0) / _OF_DIFFERENCES)
     for width in (item for item in _WIDTHS if len(values) >= _PARTS * item):
         powers = np.vander(np.arange(width) - width // 2, _DEGREE + 1, increasing=True)
         weights = np.linalg.pinv(powers)[0]  # of rows in the middle of the polynomial through them (Savitzky and Golay)
         smooth = partial(np.apply_along_axis, partial(np.convolve, weights, mode="same"), 0)
-        smoother, kept = smooth(values), weights[width // 2]  # kept: part of a variance that smoothing leaves
+        smoother, kept = smooth(values), float(weights[width // 2])
         taken = np.sqrt(np.mean((values - smoother)[width:-width] ** 2, axis=0) / (1 - kept))
         alike = 1 + _WHITE / math.sqrt(len(values))
         white = (taken <= alike * noise) & (noise <= alike * taken)
-        if np.all(white | (taken <= _QUIET * ranges)) and np.any(white & (noise > _QUIET * ranges)):
+        if np.all(white | (taken <= _QUIET * ranges)) and np.any(white & (noise > least)):
             curves = dict(zip(columns, smoother.T, strict=True))
-            return replace(record, columns={**record.columns, **curves}), float((noise / ranges).max()), smooth, width
+            smoothed = replace(record, columns={**record.columns, **curves})
+            return WhiteNoise(smoothed, float((noise / ranges).max()), smooth, width, kept)
     return None
 
 
@@ -341,7 +417,7 @@ def _beyond_chance(rows: AirRows, joints: Sequence[str], count: int) -> list[_Gr
 def _single(groups: Iterable[_Group], joints: Sequence[str]) -> Iterator[_Group]:
     """Numbers of each joint and of each link, and those of the whole robot that are no sums over joints."""
     for group in groups:
-        if group.kind == FITTED or group.kind not in BY_JOINT:
+        if group.kind not in _OF_JOINTS:
             yield group
         elif group.where != ("",):
             parts = ((joint, group.columns[:, k :: len(joints)]) for k, joint in enumerate(joints))
