@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.integrators import classical_step
 from proofroll.core.number_format import error
-from proofroll.elements.mechanism.dynamics.linear_balance import BodyColumns, body_numbers, forces_of, joint_columns
+from proofroll.elements.mechanism.dynamics import linear_balance
 from proofroll.elements.mechanism.scene.rotations import skews
 from proofroll.robots.control.bookkeeping.air import AirForces, AirLink, AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
@@ -336,7 +336,8 @@ class AirTable:
         parts = 2 * self.placed + 2 * self.rated / (1e-300 + np.abs(v).max(axis=1)) + ROUND_OFF
         noise = np.sqrt(squares + (parts * sum(sizes))[:, None] ** 2)
         damped_v = at_v + (h * rate[:, driven] if scheme.damped or scheme.whole else 0.0)
-        of_joints = joint_columns(q[:, robot.driven[:, 0]], damped_v, rate[:, driven], self.signs[rows])
+        of_joints = {"torque": np.ones(at_v.shape), "friction": -self.signs[rows], "damping": -damped_v}
+        of_joints |= {"stiffness": -q[:, robot.driven[:, 0]], "armature": -rate[:, driven]}
         by_joint = {
             name: whitened(robot.load(values[:, None] * np.eye(len(driven))).swapaxes(1, 2))
             for name, values in of_joints.items()
@@ -367,14 +368,14 @@ class AirTable:
         J[:, :, :3] -= skews((R @ com[:, :, None])[..., 0]) @ J[:, :, 3:]
         speeds = np.einsum("tbij,tj->tbi", J[:, :, :3], v), w
         fluid = (item * (1 + np.linalg.norm(item, axis=-1, keepdims=True)) for item in speeds)
-        return forces_of(BodyColumns(R, w, J).moved(*fluid), body_numbers(mass, 0 * com, inertia))
+        return linear_balance.forces(linear_balance.moved(R, J, *fluid), mass, 0 * com, inertia)
 
     def _of_bodies(self, forces: Sequence[AirForces], rate: Array) -> Array:
         """Forces that a mass, a first moment and an inertia of each body need, (rows, bodies, nv, 10)."""
         R, w, J, bias = _bodies(forces, "R_WB", "w_WB", "J", "bias")
-        columns, acceleration = BodyColumns(R, w, J), np.einsum("tbij,tj->tbi", J, rate) + bias
+        acceleration = np.einsum("tbij,tj->tbi", J, rate) + bias
         pull = acceleration[..., :3] - np.array(self.robot.mechanism.gravity)
-        return columns.moved(pull, acceleration[..., 3:]) + columns.spun()
+        return linear_balance.moved(R, J, pull, acceleration[..., 3:]) + linear_balance.spun(R, J, w)
 
 
 def _armed(robot: AirRobot, law: ControlLaw, state: tuple[Array, Array]) -> AirForces:

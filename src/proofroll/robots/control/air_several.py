@@ -15,7 +15,7 @@ from scipy.special import gammaincc
 from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.number_format import error, with_bar
-from proofroll.elements.mechanism.dynamics.linear_balance import body_numbers
+from proofroll.elements.mechanism.dynamics.linear_balance import numbers_of
 from proofroll.robots.control.air_rows import (
     BY_JOINT,
     NUMBERS,
@@ -30,7 +30,7 @@ from proofroll.robots.control.air_rows import (
 )
 from proofroll.robots.control.bookkeeping.air import AirRobot, HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.differences import instant_rows, servo_rows
+from proofroll.robots.control.differences import efforts_of, instant_rows
 from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, LayerCause
 from proofroll.robots.model import Array
 
@@ -46,8 +46,6 @@ _CHANCE, _BARS = 1e-3, 3.0  # chance of a number that is told and is not there; 
 _EACH = 2  # equations for each number at least
 _SPREAD = 5.0  # standard deviations of a sum of squares within which numbers leave as little as all of them do
 _CLEAR, _SHARE = 10.0, 0.03  # least part of a number's forces that no others make: what is left of less is their noise
-# Number of a joint, or of its servo -> what it is called, and its unit.
-_OF_JOINTS = {**BY_JOINT, "kp": ("kp of more by", "N m/rad or N/m"), "kd": ("kd of more by", "N m s/rad or N s/m")}
 _REST = "torque"  # number of a joint that a spring needs, too: its rest is not known
 
 
@@ -127,7 +125,7 @@ def _close(groups: Sequence[_Group], rows: AirRows) -> bool:
 def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
     """Groups of numbers: of the whole robot, of all joints, of springs with their rest, and of each link."""
     for name in NUMBERS:
-        if name in rows.columns and rows.columns[name].any():
+        if rows.columns[name].any():
             yield _Group(name, rows.columns[name][:, None], ("",))
     for name, columns in rows.by_joint.items():
         rests = [rows.by_joint[_REST]] if name == "stiffness" else []
@@ -203,7 +201,7 @@ def _carried(rows: AirRows) -> list[LayerCause]:
 def _point(numbers: Array) -> Array:
     """Mass, first moment and inertia (xx, yy, zz, xy, xz, yz) of a point of a mass with a first moment."""
     mass, com = numbers[:1], numbers[None, 1:] / (numbers[0] or np.inf)
-    return np.array([*numbers, *body_numbers(mass, com, np.zeros((1, 3, 3)))[0, 4:]])
+    return np.array([*numbers, *numbers_of(mass, com)[0, 4:]])
 
 
 def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -> str:
@@ -222,7 +220,7 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
         return f"{words} {text} ± {interval} {unit}"
     count = len(values) if group.kind != "stiffness" else len(values) // 2
     beyond = [k for k in beyond if k < count]
-    words, unit = _OF_JOINTS[group.kind]
+    words, unit = BY_JOINT[group.kind]
     even = 1 < len(beyond) == count and np.ptp(values[:count]) <= 2 * bars[:count].max()
     if not beyond:
         return ""
@@ -242,7 +240,7 @@ class WhiteNoise(NamedTuple):
     Attributes:
         record: without most of it.
         part: its largest part of the range of a column.
-        smooth: what smooths columns.
+        smooth: smoothing of columns.
         width: rows that are smoothed together.
         kept: part of a variance that smoothing leaves.
     """
@@ -252,6 +250,12 @@ class WhiteNoise(NamedTuple):
     smooth: Callable[[Array], Array]
     width: int
     kept: float
+
+    @property
+    def told(self) -> str:
+        """Clause on the noise."""
+        part = f"white noise of up to {error(100 * self.part, 1)} % of a range"
+        return f"{part}, smoothed over {self.width} rows, explains it"
 
 
 def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: str) -> Layer | None:
@@ -277,75 +281,48 @@ def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: st
     instants: Any = np.arange(white.width, len(states) - white.width, white.width)
     try:
         rows = table.rows(instants, moving[0], StepScheme(), central=True)
-    except (Diverged, Refused):
-        return None
-    lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts of other instants
-    rows, _ = _moving(rows.changed(lambda values: values - np.multiply.outer(lag, lag @ values)), law.joints)
-    return _hidden("acceleration", rows, law, white, off)
-
-
-def noisy_efforts(record: ControlRecord, law: ControlLaw) -> Layer | None:
-    """Layer of efforts that white noise of states and efforts hides, with the gains beyond their bars.
-
-    None: there is no such noise, or it does not explain what efforts are off by.
-    """
-    recorded, servos, white = record.stacked("effort", law.joints), servo_rows(record, law), white_noise(record)
-    if recorded is None or isinstance(servos, str) or white is None:
-        return None
-    target, q, v, known = servos
-    every: Any = instant_rows(record, law) if law.hold_effort else np.flatnonzero(known)
-    free = np.abs(law.kp * (target - q) - law.kd * v) < law.limit
-    parts = (recorded - law.effort(target, q, v), free * (target - q), -v * free, free, law.kp * (target - q))
-    raw = np.stack([np.asarray(item, float)[every] for item in parts])
-    level = np.sqrt(white.kept / _OF_DIFFERENCES) * np.diff(raw[0], _DEGREE, axis=0).std(axis=0)
-    left, *columns, acting = (white.smooth(item)[white.width : -white.width : white.width] for item in raw)
-    joints = np.eye(len(law.joints))
-    by_joint = {
-        name: (item[..., None] * joints).reshape(-1, len(joints))
-        for name, item in zip(("kp", "kd", "torque"), columns, strict=True)
-        if item.any()
-    }
-    whole, none = np.ravel(left), np.zeros(left.size)
-    rows = AirRows(
-        left=whole,
-        columns={},
-        by_joint=by_joint,
-        added={},
-        rounding=0.0,
-        late=none,
-        size=rms(acting),
-        slow=none > 0,
-        freedoms=len(joints),
-    )
-    rest = _solved(np.concatenate([*by_joint.values()], axis=1), whole)[1].reshape(left.shape)
-    if not np.all(rest.std(axis=0) <= level * (1 + _WHITE / math.sqrt(len(left)))):
-        return None
-    return _hidden("effort", rows, law, white, f"efforts are off by {error(float(np.abs(raw[0]).max()))}")
-
-
-def _hidden(name: str, rows: AirRows, law: ControlLaw, white: WhiteNoise, off: str) -> Layer | None:
-    """Layer that white noise hides, with the numbers beyond their bars; None: too few rows, or more than noise is left.
-
-    ``off``: clause on what it is off by.
-    """
-    others = _columns([group for group in _groups(rows, law.joints) if group.kind != "effort"])
-    count = int(np.linalg.matrix_rank(_scaled(others)[0], ROUND_OFF))
-    if len(rows.left) < _EACH * count:
-        return None
-    try:
+        lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts of other instants
+        rows, groups = _moving(rows.changed(lambda values: values - np.multiply.outer(lag, lag @ values)), law.joints)
+        others = _columns([group for group in groups if group.kind != "effort"])
+        count = int(np.linalg.matrix_rank(_scaled(others)[0], ROUND_OFF))
+        if len(rows.left) < _EACH * count:
+            return None
         rows = _in_noise(rows, _solved(others, rows.left)[1], count)
-    except np.linalg.LinAlgError:  # along a direction there is no noise
+    except (Diverged, Refused, np.linalg.LinAlgError):  # the last: along a direction there is no noise
         return None
     if (chosen := _beyond_chance(rows, law.joints, count)) is None:
         return None
     columns = _columns(chosen) if chosen else np.zeros((len(rows.left), 0))
     causes = tuple(_told(rows, chosen, columns, _solved(columns, rows.left)[0], right_numbers(law)))
-    told = (
-        f"white noise of up to {error(100 * white.part, 1)} % of a range, smoothed over {white.width} rows, explains it"
-    )
     numbers = "these numbers alone are" if causes else "no number is"
-    reason = f"{off}; {told}, and {numbers} off by more than their bars"
-    return Layer(name, reason=reason, causes=causes, undecided=True, noise=white.part)
+    reason = f"{off}; {white.told}, and {numbers} off by more than their bars"
+    return Layer("acceleration", reason=reason, causes=causes, undecided=True, noise=white.part)
+
+
+def commanded_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot) -> Layer:
+    """Layer of accelerations of a record without efforts, under those of the law where white noise hides it."""
+    absent = "the record has no columns effort.JOINT"
+    efforts = efforts_of(record, law) if white_noise(record) else absent
+    if isinstance(efforts, str) or not np.isfinite(efforts).all():
+        return Layer("acceleration", reason=absent)
+    columns = {f"effort.{joint}": column for joint, column in zip(law.joints, efforts.T, strict=True)}
+    record = replace(record, columns={**record.columns, **columns})
+    absent = f"{absent}: they are the law's for its states"
+    return noisy_layer(record, law, held, absent) or Layer("acceleration", reason=absent)
+
+
+def noisy_efforts(record: ControlRecord, law: ControlLaw) -> Layer | None:
+    """Layer of efforts that the law gives but for white noise of states and efforts; None: more than that is left."""
+    recorded, efforts, white = record.stacked("effort", law.joints), efforts_of(record, law), white_noise(record)
+    if recorded is None or isinstance(efforts, str) or white is None:
+        return None
+    off = (recorded - efforts)[instant_rows(record, law) if law.hold_effort else np.isfinite(efforts).all(axis=1)]
+    level = np.diff(off, _DEGREE, axis=0).std(axis=0) * math.sqrt(white.kept / _OF_DIFFERENCES)
+    left = white.smooth(off)[white.width : -white.width : white.width]
+    if not len(left) or not np.all(np.sqrt(np.mean(left**2, axis=0)) <= level * (1 + _WHITE / math.sqrt(len(left)))):
+        return None
+    reason = f"efforts are off by {error(float(np.abs(off).max()))}; {white.told}, and no more is left"
+    return Layer("effort", reason=reason, undecided=True, noise=white.part)
 
 
 @lru_cache(maxsize=4)
@@ -417,7 +394,7 @@ def _beyond_chance(rows: AirRows, joints: Sequence[str], count: int) -> list[_Gr
 def _single(groups: Iterable[_Group], joints: Sequence[str]) -> Iterator[_Group]:
     """Numbers of each joint and of each link, and those of the whole robot that are no sums over joints."""
     for group in groups:
-        if group.kind not in _OF_JOINTS:
+        if group.kind == FITTED or group.kind not in BY_JOINT:
             yield group
         elif group.where != ("",):
             parts = ((joint, group.columns[:, k :: len(joints)]) for k, joint in enumerate(joints))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.robots.control.air_fit import AirFit, StandingFit, acceleration_fit, standing_fit
-from proofroll.robots.control.air_several import noisy_efforts, noisy_layer, white_noise
+from proofroll.robots.control.air_several import commanded_layer, noisy_efforts, noisy_layer, white_noise
 from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import (
@@ -202,7 +202,7 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     record, law, assumed = evidence.in_air.reported or evidence.record, evidence.law, evidence.in_air.assumed
     efforts = record.stacked("effort", law.joints)
     if efforts is None:
-        return _commanded(record, evidence)
+        return commanded_layer(record, law, evidence.in_air.held)
     fit, off_stops, remark = evidence.in_air.fit(record, law, evidence.in_air.held, efforts)
     if evidence.in_air.stepped is not None and not isinstance(fit, str) and fit.off > fit.bar:
         rival = evidence.in_air.fit(evidence.record, law, evidence.in_air.stepped, efforts)
@@ -244,18 +244,6 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
         causes=fit.causes,
         tried=0 if earlier else fit.tried,
     )
-
-
-def _commanded(record: ControlRecord, evidence: _Evidence) -> Layer:
-    """Layer of accelerations of a record without efforts: where its noise is white, under those of the law."""
-    law, absent = evidence.law, "the record has no columns effort.JOINT"
-    efforts = efforts_of(record, law) if white_noise(record) else absent
-    noisy = None
-    if not isinstance(efforts, str) and np.isfinite(efforts).all():
-        columns = {f"effort.{joint}": column for joint, column in zip(law.joints, efforts.T, strict=True)}
-        record = dataclasses.replace(record, columns={**record.columns, **columns})
-        noisy = noisy_layer(record, law, evidence.in_air.held, f"{absent}: they are the law's for its states")
-    return noisy or Layer("acceleration", reason=absent)
 
 
 def _rows_are_steps(record: ControlRecord, law: ControlLaw) -> bool:

@@ -20,8 +20,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.pressing import SCENES_LAW, ContactLimits, Pressing, Resisting, pressing
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Tree
-from proofroll.elements.mechanism.dynamics.linear_balance import BodyColumns, body_numbers, forces_of, joint_columns
+from proofroll.elements.mechanism.dynamics.linear_balance import forces, moved, spun
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.point_loads import PointLoad, applied_loads, bushing_loads, spring_loads
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
@@ -63,20 +64,12 @@ class MechanismState:
     acceleration: FloatArray
 
     @cached_property
-    def bodies(self) -> BodyColumns:
-        """Columns of numbers of the bodies."""
-        return BodyColumns(self.motion.R_WB[:-1], self.motion.w_WB[:-1], self.motion.J[:-1])
-
-    @cached_property
-    def columns(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Forces that numbers of the bodies need by accelerations and by spin, and their momenta, (bodies, nv, 10)."""
-        moved = self.bodies.moved(self.acceleration[:, :3], self.acceleration[:, 3:])
-        return moved, self.bodies.spun(), self.bodies.moved(self.motion.v_WB[:-1], self.motion.w_WB[:-1])
-
-    def masses(self, numbers: FloatArray) -> FloatArray:
-        """Mass matrix for numbers of the bodies, (nv, nv)."""
-        J = np.moveaxis(self.bodies.J, 2, 0)
-        return forces_of(self.bodies.moved(J[..., :3], J[..., 3:]), numbers)
+    def columns(self) -> tuple[FloatArray, ...]:
+        """Forces that numbers of bodies need by accelerations, by spin, for momenta, and by unit accelerations."""
+        motion, (a, alpha) = self.motion, np.split(self.acceleration, 2, axis=1)
+        R, w, v, J = motion.R_WB[:-1], motion.w_WB[:-1], motion.v_WB[:-1], motion.J[:-1]
+        axes = np.repeat(np.eye(3)[:, None], len(R), axis=1)
+        return moved(R, J, a, alpha), spun(R, J, w), moved(R, J, v, w), moved(R, J, axes, 0 * axes)
 
 
 class MechanismStates:
@@ -256,30 +249,27 @@ class Change:
             for name, value in (("mass", self.mass), ("com", self.com), ("inertia", self.inertia))
         )
         g = np.array(mechanism.gravity) if self.gravity is None else self.gravity
-        none = np.zeros_like(inertia)
-        points, turning = body_numbers(mass, com, none), body_numbers(0 * mass, com, inertia)
-        hung = body_numbers(mass, 0 * com, none) if self.weight_at_origin else points
-        moved, spun, momenta = state.columns
-        terms = [forces_of(moved + spun, points), forces_of(moved, turning), self.gyroscopic * forces_of(spun, turning)]
+        origin, none, rate = 0 * com, 0 * mass, states.v_rates[i]
+        by_acceleration, by_spin, momenta, by_axes = state.columns
+        terms = [forces(by_acceleration + by_spin, mass, com), forces(by_acceleration, none, com, inertia)]
+        terms.append(self.gyroscopic * forces(by_spin, none, com, inertia))
+        by_v = [joint for joint in mechanism.joints for _ in range(joint.nv)]
+        terms.append((self.armature * np.array([j.armature for j in by_v]) + self.added_armature) * rate)
         if self.coupling is not None:
-            terms.append(-(state.masses(points + turning) * self.coupling) @ states.v_rates[i])
-        acts = forces_of(state.bodies.moved(np.broadcast_to(g, com.shape), 0 * com), hung)
-        for lost, numbers in zip(self.decay, (points, turning), strict=True):
-            acts = acts - lost * forces_of(momenta, numbers)
+            M = JointCoordinates(mechanism, rank=0).inertial(state.motion)[1]
+            terms.append(-(M * self.coupling) @ rate)
+        acts = g @ forces(by_axes, mass, origin if self.weight_at_origin else com)
+        acts = acts + self.torque * np.array([float(value_at(j.torque, state.t)) for j in by_v])
+        acts = acts - self.friction * np.array([j.friction for j in by_v]) * np.sign(state.v)
+        acts = acts - self.decay[0] * forces(momenta, mass, com) - self.decay[1] * forces(momenta, none, com, inertia)
         acts = acts + states.pressing(i, self.resisting).known
         for actuator in mechanism.actuators:
             at_one, rated = m.place_of(actuator.joint)
             acts[rated] += self.effort(actuator, state.t, float(state.q[at_one]), float(state.v[rated]))
-        stretched, by_v = np.zeros(m.nv), [joint for joint in mechanism.joints for _ in range(joint.nv)]
+        acts = acts - (self.damping * np.array([j.damping for j in by_v]) + self.added_damping) * state.v
         for joint, at_q, at_v in zip(mechanism.joints, m.q_slices, m.v_slices, strict=True):
             if joint.stiffness:
-                stretched[at_v] = state.q[at_q] - joint.rest
-        columns = joint_columns(stretched, state.v, states.v_rates[i], np.sign(state.v))
-        for law, column in columns.items():
-            of_joints = np.array([float(value_at(getattr(joint, law), state.t)) for joint in by_v])
-            columns[law] = (getattr(self, law) * of_joints + getattr(self, f"added_{law}", 0.0)) * column
-        terms.append(-columns.pop("armature"))
-        acts = acts + sum(columns.values())
+                acts[at_v] -= self.stiffness * joint.stiffness * (state.q[at_q] - joint.rest)
         for factor, load in self._point_loads(state):
             acts = acts + factor * load.along(state.motion)
         return np.array([sum(terms), acts, sum(map(np.abs, terms)) + np.abs(acts)])

@@ -1,9 +1,9 @@
-"""Forces along the velocities of a tree that one more of each number of bodies and joints needs.
+"""Forces along the velocities of a tree that one more of each number of its bodies needs, (..., bodies, nv, 10).
 
-Numbers of a body are its mass, first moment [kg m], and inertia about its origin (xx, yy, zz, xy, xz, yz) [kg m²].
+Numbers of a body are its mass, first moment [kg m], and inertia about its origin (xx, yy, zz, xy, xz, yz) [kg m²]. The
+motion is given by rotations R (..., bodies, 3, 3), derivatives J of (velocity, spin) by the velocities of the tree
+(..., bodies, 6, nv), and vectors along the world's axes, (..., bodies, 3).
 """
-
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,39 +12,31 @@ from proofroll.elements.mechanism.scene.rotations import Array, skews
 _HAS = np.array([[1, 0, 0, 1, 1, 0], [0, 1, 0, 1, 0, 1], [0, 0, 1, 0, 1, 1]])  # moments that a component multiplies
 
 
-class BodyColumns(NamedTuple):
-    """Forces along the velocities that numbers of bodies need, (..., bodies, nv, 10), from the bodies' motion.
+def moved(R: Array, J: Array, linear: Array, angular: Array) -> Array:
+    """Forces by accelerations of the origins and of the turning, without spin; for velocities they are momenta."""
+    a, alpha = (_along_body(R, vector) for vector in (linear, angular))
+    wrench = np.zeros((*a.shape[:-1], 6, 10))
+    wrench[..., :3, 0], wrench[..., 3:, 1:4] = a, -skews(a)
+    wrench[..., :3, 1:4], wrench[..., 3:, 4:] = skews(alpha), _inertial(alpha)
+    return _along(R, J, wrench)
 
-    Attributes:
-        R_WB, w_WB: rotation and angular velocity of each body, (..., bodies, 3, 3), (..., bodies, 3).
-        J: derivative of (v_WB, w_WB) by the velocities of the tree, (..., bodies, 6, nv).
-    """
 
-    R_WB: Array
-    w_WB: Array
-    J: Array
+def spun(R: Array, J: Array, w: Array) -> Array:
+    """Forces by the spin: centripetal and gyroscopic ones."""
+    w = _along_body(R, w)
+    wrench, across = np.zeros((*w.shape[:-1], 6, 10)), skews(w)
+    wrench[..., :3, 1:4], wrench[..., 3:, 4:] = across @ across, across @ _inertial(w)
+    return _along(R, J, wrench)
 
-    def moved(self, linear: Array, angular: Array) -> Array:
-        """Columns for accelerations (linear, angular) of the origins without spin, or for velocities: of momenta."""
-        back = np.swapaxes(self.R_WB, -1, -2)
-        a, alpha = ((back @ vector[..., None])[..., 0] for vector in (linear, angular))
-        wrench = np.zeros((*a.shape[:-1], 6, 10))
-        wrench[..., :3, 0], wrench[..., 3:, 1:4] = a, -skews(a)
-        wrench[..., :3, 1:4], wrench[..., 3:, 4:] = skews(alpha), _inertial(alpha)
-        return self._along(wrench)
 
-    def spun(self) -> Array:
-        """Columns for the turning of the bodies at constant angular velocities."""
-        w = (np.swapaxes(self.R_WB, -1, -2) @ self.w_WB[..., None])[..., 0]
-        wrench, across = np.zeros((*w.shape[:-1], 6, 10)), skews(w)
-        wrench[..., :3, 1:4], wrench[..., 3:, 4:] = across @ across, across @ _inertial(w)
-        return self._along(wrench)
+def _along_body(R: Array, vector: Array) -> Array:
+    return np.asarray((np.swapaxes(R, -1, -2) @ vector[..., None])[..., 0])
 
-    def _along(self, wrench: Array) -> Array:
-        """Columns for wrenches at the origins in body axes, (..., bodies, 6, 10)."""
-        turned = np.swapaxes(self.J, -1, -2)
-        parts = (turned[..., k : k + 3] @ self.R_WB @ wrench[..., k : k + 3, :] for k in (0, 3))
-        return np.asarray(sum(parts))
+
+def _along(R: Array, J: Array, wrench: Array) -> Array:
+    """Forces along the velocities for wrenches at the origins, along the bodies' own axes."""
+    turned = np.swapaxes(J, -1, -2)
+    return np.asarray(turned[..., :3] @ R @ wrench[..., :3, :] + turned[..., 3:] @ R @ wrench[..., 3:, :])
 
 
 def _inertial(a: Array) -> Array:
@@ -58,26 +50,12 @@ def steiner(mass: Array, com: Array) -> Array:
     return np.asarray(mass[:, None, None] * (squares - com[:, :, None] * com[:, None, :]))
 
 
-def body_numbers(mass: Array, com: Array, inertia: Array) -> Array:
+def forces(columns: Array, mass: Array, com: Array, inertia: Array | float = 0.0) -> Array:
+    """Forces along the velocities, (..., nv), for bodies of some masses, centres of mass and inertias about these."""
+    return np.asarray(np.einsum("...bvk,bk->...v", columns, numbers_of(mass, com, inertia)))
+
+
+def numbers_of(mass: Array, com: Array, inertia: Array | float = 0.0) -> Array:
     """Numbers of bodies of some masses, centres of mass and inertias about these, (bodies, 10)."""
-    about = inertia + steiner(mass, com)
-    six = about[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    six = (inertia + steiner(mass, com))[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return np.concatenate([mass[:, None], mass[:, None] * com, six], axis=1)
-
-
-def forces_of(columns: Array, numbers: Array) -> Array:
-    """Forces along the velocities for numbers of all bodies, (..., nv)."""
-    return np.asarray(np.einsum("...bvk,bk->...v", columns, numbers))
-
-
-def joint_columns(q: Array, v: Array, rates: Array, signs: Array) -> dict[str, Array]:
-    """Forces that act along single velocities for one more of each law of a joint, in the shape of all arguments.
-
-    Args:
-        q: coordinates from the rest of springs.
-        v: velocities at which damping acts.
-        rates: accelerations.
-        signs: of the velocities, against which dry friction acts.
-    """
-    columns = {"torque": np.ones(v.shape), "friction": -signs, "damping": -v, "stiffness": -q, "armature": -rates}
-    return {name: np.asarray(item) for name, item in columns.items()}
