@@ -22,7 +22,7 @@ from proofroll_drill.referee.random_contacts import random_contacts
 NIGHTLY = pytest.mark.nightly
 ROLLING, SPINNING = 2e-3, 3e-3  # m
 APART = 3.0  # factor between bars, whose round-off depends on the axes
-LEAST = 1e-12  # bars of SI units below which they are round-off alone
+LEAST = 1e-12  # bars, relative to values above 1 in SI units, below which they are round-off alone
 SCENES = {
     "sled": 0.65, "eccentric_sphere": 0.6, "rolling_coin": 0.2, "rattleback": 0.1, "free_turntable": 0.3,
     "spinning_bounce": 0.5, "two_spheres": 0.3, "ladder": 0.3, "falling_rod": 0.6,
@@ -74,7 +74,8 @@ def assert_the_same_elsewhere(mechanism: Mechanism, until: float, seed: int) -> 
         turned = getattr(here.record, name) @ R.T
         assert np.nanmax(np.abs(turned - getattr(there.record, name))) <= bars
     for name, bar in here.bars.items():
-        known = sorted([max(float(bar[-1]), LEAST), max(float(there.bars[name][-1]), LEAST)])
+        least = LEAST * float(np.nanmax(np.abs(getattr(here.record, name, 1.0)), initial=1.0))
+        known = sorted([max(float(bar[-1]), least), max(float(there.bars[name][-1]), least)])
         assert known[1] <= APART * known[0], name
 
 

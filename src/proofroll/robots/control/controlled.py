@@ -24,6 +24,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.model import TOGETHER
 from proofroll.elements.mechanism.scene.policy import PolicySource
 from proofroll.elements.mechanism.scene.rotations import from_quaternion
+from proofroll.elements.mechanism.scene.signal import value_at
 from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
 from proofroll.robots.files.feet import GROUNDS, NO_FLOOR, NO_GROUND, OF_FILE, StandingRobot, ground_tables
@@ -69,6 +70,8 @@ _STANDING = 0.3  # s: duration of a robot on a ground, which lands and stands by
 _SEEN = 1e-6  # m: way of a robot at its start that is told
 _GROUND_WORDS = "what the robot stands on: nothing (0), the floor of its file (1), or a plane z = 0 (2)"
 _STEEP = 0.1  # cosine between the normal of a plane and the vertical from which on it is a wall
+# Times of the second in which is looked who touches whom, at which servos get their targets [s].
+_WATCHED = (np.arange(50) / 50).tolist()
 _ABOVE = 10.0  # m: by which a robot is lifted while the heights of its shapes are measured
 
 
@@ -223,7 +226,7 @@ class ControlledScenes:
         asked = controller.ground or GroundContact()
         start = start_of(file, robot, controller, placed=True)
         servos = {
-            row["joint"]: (row["kp"], row["kd"], _first_target(row["target"], float(start.angle[row["joint"]][0])))
+            row["joint"]: (row["kp"], row["kd"], [float(value_at(row["target"], time)) for time in _WATCHED])
             for row in tables["actuators"]
         }
         standing = StandingRobot(
@@ -284,11 +287,6 @@ class ControlledScenes:
 def _base(controller: Controller, ground: int) -> str:
     """Support of the root of a URDF: nothing where the controller puts it somewhere, or it stands on a ground."""
     return "free" if controller.start.base is not None or ground else "fixed"
-
-
-def _first_target(target: Any, angle: float) -> float:
-    """Target of a servo at the start: a number, or the joint's own coordinate where it moves."""
-    return target if isinstance(target, float) else angle
 
 
 def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> float:

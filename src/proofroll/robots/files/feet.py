@@ -80,7 +80,7 @@ class StandingRobot:
         file, robot: the file and its robot.
         bodies: link that moves -> its body in the scene.
         start: its state.
-        servos: joint -> gains kp and kd and target of its servo.
+        servos: joint -> gains kp and kd of its servo, and its targets at equal intervals of a second.
         drop: height of its lowest shape over the floor [m]; None: as in the file.
     """
 
@@ -88,7 +88,7 @@ class StandingRobot:
     robot: Robot
     bodies: Mapping[str, str]
     start: RobotStates
-    servos: Mapping[str, tuple[float, float, float]]
+    servos: Mapping[str, tuple[float, float, list[float]]]
     drop: float | None = None
 
     def armature(self, joint: str) -> float:

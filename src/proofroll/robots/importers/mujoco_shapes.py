@@ -28,7 +28,7 @@ _KINDS = {
 def near_shapes(
     path: Path,
     start: Mapping[str, Sequence[float]],
-    servos: Mapping[str, Sequence[float]],
+    servos: Mapping[str, tuple[float, float, Sequence[float], float]],
     base_joint: str,
     floor: bool,
     drop: float | None,
@@ -40,7 +40,7 @@ def near_shapes(
     Args:
         path: of an MJCF, or of a URDF without meshes.
         start: joint -> coordinates: those of one axis from the file's pose [rad or m], a quaternion, a place and one.
-        servos: joint -> gains kp and kd, target from the file's pose, armature.
+        servos: joint -> gains kp and kd, targets from the file's pose at equal intervals of the second, armature.
         base_joint: name of the joint that frees the root of a URDF; empty: nothing does.
         floor: True for a floor z = 0 in place of the file's planes; each shape that collides with any collides with it.
         drop: height of the lowest shape over the floor [m]; None: as it is, or 1 cm where it overlaps the floor.
@@ -56,7 +56,10 @@ def near_shapes(
     found: dict[tuple[int, int], dict[str, Any]] = {}
     _widen(model.geom_gap, model.geom_margin, _NEAR / 2 if _gap_widens() else _NEAR)
     _widen(model.pair_gap, model.pair_margin, _NEAR)
+    places = [int(model.joint(name).qposadr[0]) for name in servos]
     for step in range(min(int(_SECONDS / model.opt.timestep), int(_MOST / max(model.nv, 1)))):
+        for place, (_, _, targets, _) in zip(places, servos.values(), strict=True):
+            model.qpos_spring[place] = model.qpos0[place] + targets[int(len(targets) * data.time / _SECONDS)]
         mujoco.mj_step(model, data)
         if not np.isfinite(data.qacc).all() or data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number:
             break
@@ -123,7 +126,7 @@ def _compiled(path: Path, base_joint: str, *, floor: bool) -> Any:
     return spec.compile()
 
 
-def _put(model: Any, data: Any, start: Mapping[str, Sequence[float]], servos: Mapping[str, Sequence[float]]) -> None:
+def _put(model: Any, data: Any, start: Mapping[str, Sequence[float]], servos: Mapping[str, Sequence[Any]]) -> None:
     """Sets the start, and the springs and dampers of joints in place of actuators."""
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
@@ -133,13 +136,11 @@ def _put(model: Any, data: Any, start: Mapping[str, Sequence[float]], servos: Ma
         data.qpos[place : place + len(values)] = values
         if len(values) == 1:
             data.qpos[place] += model.qpos0[place]
-    for name, (kp, kd, target, armature) in servos.items():
+    for name, (kp, kd, _, armature) in servos.items():
         joint = model.joint(name)
-        place, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
         model.jnt_stiffness[joint.id] = kp
-        model.qpos_spring[place] = model.qpos0[place] + target
-        model.dof_damping[dof] += kd
-        model.dof_armature[dof] = armature
+        model.dof_damping[joint.dofadr[0]] += kd
+        model.dof_armature[joint.dofadr[0]] = armature
 
 
 def _lift(model: Any, data: Any, drop: float | None) -> None:

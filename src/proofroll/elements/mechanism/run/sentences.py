@@ -49,8 +49,11 @@ def start_facts(element: MechanismElement) -> Sequence[str]:
     bound = element.step_bound(())
     clauses += [bound] if bound else []
     touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))
-    gaps = [f"{pair.name} {touch.gap:.4g} m" for pair, touch in zip(mechanism.contacts, touching, strict=True)]
-    clauses += [f"gaps of pairs: {', '.join(gaps)}"] if gaps else []
+    gaps = dict[str, float]()  # the least one of each pair, which may have many points
+    for contact, touch in zip(mechanism.contacts, touching, strict=True):
+        gaps[contact.pair] = min(gaps.get(contact.pair, np.inf), touch.gap)
+    told = [f"{pair} {gap:.4g} m" for pair, gap in gaps.items()]
+    clauses += [f"gaps of pairs: {', '.join(told)}"] if told else []
     return [*clauses, FRAMES]
 
 
