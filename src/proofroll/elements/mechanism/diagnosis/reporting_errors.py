@@ -11,7 +11,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, known_difference, largest_difference, longest
 from proofroll.core.diagnosis import Cause, Difference, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.lines import differing
+from proofroll.core.diagnosis.fitting import differing
 from proofroll.core.diagnosis.samples import (
     another_clock,
     at_start,
