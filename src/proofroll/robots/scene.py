@@ -104,9 +104,7 @@ class RobotScenes:
 def _parameters(file: RobotFile, robot: Robot) -> dict[str, ParameterRow]:
     """Parameters of a robot but for its start and its actuators."""
     gravity = float(np.linalg.norm(robot.gravity))
-    parameters: dict[str, ParameterRow] = {
-        "gravity": (gravity, "m/s^2", "acceleration of gravity", {"at_least": 0}),
-    }
+    parameters: dict[str, ParameterRow] = {"gravity": (gravity, "m/s^2", "acceleration of gravity", {"at_least": 0})}
     if file.kind == "urdf":
         parameters["free_base"] = (0, "1", "whether nothing holds the root (1), or the world does (0)", SWITCH)
     return parameters | laws(robot)

@@ -132,11 +132,7 @@ def _closed(file: RobotFile) -> Iterator[_Noticed]:
     closing = Counter(item.tag for item in parts if item.tag != "joint")
     if closing:
         kinds = ", ".join(f"{number} <{tag}>" for tag, number in closing.items())
-        yield (
-            "warning",
-            "equality",
-            f"{kinds}: the check compares the tree as if open; `run` and `compare` close it",
-        )
+        yield ("warning", "equality", f"{kinds}: the check compares the tree as if open; `run` and `compare` close it")
 
 
 def _trees(parent: Element) -> int:

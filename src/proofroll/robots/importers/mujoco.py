@@ -14,18 +14,7 @@ from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_qua
 from proofroll.engines.mujoco.running import mass_matrix, written
 from proofroll.robots.importers.mujoco_actuators import actuators_of, is_off, reflected
 from proofroll.robots.importers.mujoco_shapes import near_shapes
-from proofroll.robots.model import (
-    NO_BODY,
-    Array,
-    Cord,
-    Mimic,
-    Robot,
-    RobotBody,
-    RobotJoint,
-    RobotLoop,
-    Tie,
-    composed,
-)
+from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie, composed
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
 # Springs and dampers; MuJoCo up to 3.3 has one flag for both.

@@ -309,15 +309,7 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
         yield creeping.cause("creep", says, remainder, "make that speed smaller", 1)
 
 
-HYPOTHESES = (
-    convex_cone,
-    convex_cone_from_rest,
-    pyramid,
-    pyramid_at_start,
-    friction_factor,
-    left_out,
-    creep,
-)
+HYPOTHESES = (convex_cone, convex_cone_from_rest, pyramid, pyramid_at_start, friction_factor, left_out, creep)
 
 
 @hypothesis("contact forces", "the engine reports the true forces with another sign, frame or time")

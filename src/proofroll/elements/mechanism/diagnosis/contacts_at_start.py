@@ -9,12 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, longest
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Cause, Difference, Evidence, hypothesis
-from proofroll.core.diagnosis.fitting import (
-    change_by,
-    factor_text,
-    least_squares_parameter,
-    least_squares_parameters,
-)
+from proofroll.core.diagnosis.fitting import change_by, factor_text, least_squares_parameter, least_squares_parameters
 from proofroll.core.errors import Refused
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.contact.start import TOUCHING

@@ -135,10 +135,7 @@ def _reactions(
         yield Reactions(vector, which, placed, true["force"][:, which])
 
 
-@hypothesis(
-    "reactions",
-    "the engine reports the true wrench with another sign, frame, point, joint or time",
-)
+@hypothesis("reactions", "the engine reports the true wrench with another sign, frame, point, joint or time")
 def reactions(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses on forces and moments of joints and loops along the run, where they are determinate."""
     pair = run_and_truth(evidence)

@@ -192,10 +192,7 @@ REPORTING_ERRORS: tuple[Any, ...] = (
         _size,
         lambda vector, evidence: (*_of_centres(vector, evidence), *_of_contacts(vector, evidence)),
     ),
-    at_start(
-        lambda element: {name: frame[0] for name, frame in frames_of(element, element.start).items()},
-        _FOLLOWS,
-    ),
+    at_start(lambda element: {name: frame[0] for name, frame in frames_of(element, element.start).items()}, _FOLLOWS),
     centres_at_start,
     reported_quaternions(_attitudes),
     single_precision_run,

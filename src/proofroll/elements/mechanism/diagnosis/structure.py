@@ -159,10 +159,7 @@ _OPEN = 1e-4
 _BALANCED = 1e-3
 
 
-@by_rows(
-    "tree out of order",
-    "the equations balance without the terms that an algorithm for depth-first order loses",
-)
+@by_rows("tree out of order", "the equations balance without the terms that an algorithm for depth-first order loses")
 def lost_coupling(evidence: Evidence, _: Residuals[Change]) -> Iterator[CauseRow[Change]]:
     """Rows: the mass matrix lacks terms between a body and its descendants, all or one pair."""
     mechanism: Mechanism = evidence.element.mechanism

@@ -222,12 +222,7 @@ def _fixed(name: str, words: str, layer: str, *, later: bool = False, **changes:
 
 
 def _sized(
-    name: str,
-    words: str,
-    layer: str,
-    changed: str | LawChange,
-    starts: tuple[float, ...] = (0.95,),
-    **attributes: Any,
+    name: str, words: str, layer: str, changed: str | LawChange, starts: tuple[float, ...] = (0.95,), **attributes: Any
 ) -> Mistake:
     """Mistake of a number, which multiplies an attribute of the law or changes it otherwise."""
     change = partial(_scaled, changed) if isinstance(changed, str) else changed

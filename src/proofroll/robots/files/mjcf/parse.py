@@ -28,18 +28,7 @@ from proofroll.robots.files.robot_file import (
 _DEEPEST = 8
 _MOST_MODELS = 32
 # Elements that change neither masses nor torques without contacts.
-_LOOKS = {
-    "visual",
-    "statistic",
-    "size",
-    "texture",
-    "material",
-    "skin",
-    "hfield",
-    "sensor",
-    "contact",
-    "custom",
-}
+_LOOKS = {"visual", "statistic", "size", "texture", "material", "skin", "hfield", "sensor", "contact", "custom"}
 # Elements that change masses or motion in a way that the check does not cover.
 _UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
 # Attributes that say where an actuator acts.
