@@ -235,27 +235,14 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
 
 
 class WhiteNoise(NamedTuple):
-    """White noise of a record.
-
-    Attributes:
-        record: without most of it.
-        part: its largest part of the range of a column.
-        smooth: smoothing of columns.
-        width: rows that are smoothed together.
-        kept: part of a variance that smoothing leaves.
-    """
+    """White noise of a record: the smooth record, and how it is smoothed."""
 
     record: ControlRecord
-    part: float
+    part: float  # largest part of the range of a column
+    told: str  # clause
     smooth: Callable[[Array], Array]
-    width: int
-    kept: float
-
-    @property
-    def told(self) -> str:
-        """Clause on the noise."""
-        part = f"white noise of up to {error(100 * self.part, 1)} % of a range"
-        return f"{part}, smoothed over {self.width} rows, explains it"
+    width: int  # rows that are smoothed together
+    kept: float  # part of a variance that smoothing leaves
 
 
 def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: str) -> Layer | None:
@@ -307,8 +294,8 @@ def commanded_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot) -> 
         return Layer("acceleration", reason=absent)
     columns = {f"effort.{joint}": column for joint, column in zip(law.joints, efforts.T, strict=True)}
     record = replace(record, columns={**record.columns, **columns})
-    absent = f"{absent}: they are the law's for its states"
-    return noisy_layer(record, law, held, absent) or Layer("acceleration", reason=absent)
+    told = f"{absent}: they are the law's for its states"
+    return noisy_layer(record, law, held, told) or Layer("acceleration", reason=absent)
 
 
 def noisy_efforts(record: ControlRecord, law: ControlLaw) -> Layer | None:
@@ -352,7 +339,9 @@ def white_noise(record: ControlRecord) -> WhiteNoise | None:
         if np.all(white | (taken <= _QUIET * ranges)) and np.any(white & (noise > least)):
             curves = dict(zip(columns, smoother.T, strict=True))
             smoothed = replace(record, columns={**record.columns, **curves})
-            return WhiteNoise(smoothed, float((noise / ranges).max()), smooth, width, kept)
+            part = float((noise / ranges).max())
+            told = f"white noise of up to {error(100 * part, 1)} % of a range, smoothed over {width} rows, explains it"
+            return WhiteNoise(smoothed, part, told, smooth, width, kept)
     return None
 
 

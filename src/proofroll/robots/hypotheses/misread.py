@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.robots.files.mjcf.defaults import with_classes
+from proofroll.robots.files.mjcf.parse import with_classes
 from proofroll.robots.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
 from proofroll.robots.model import NO_BODY, Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import Reading
