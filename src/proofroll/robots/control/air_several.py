@@ -313,12 +313,12 @@ def noisy_efforts(record: ControlRecord, law: ControlLaw) -> Layer | None:
 
 
 @lru_cache(maxsize=4)
-def white_noise(record: ControlRecord) -> WhiteNoise | None:
-    """White noise of states and efforts; None: they have other noise, or none.
+def white_noise(record: ControlRecord, *, efforts: bool = True) -> WhiteNoise | None:
+    """White noise of states, and of efforts if asked; None: they have other noise, or none.
 
     The widest smoothing counts that takes away no more of any column than white noise.
     """
-    kinds = ("q.", "v.", "effort.", *(f"{name}." for name in BASE))
+    kinds = ("q.", "v.", *(f"{name}." for name in BASE), *(("effort.",) if efforts else ()))
     columns = {name: item for name, item in record.columns.items() if name.startswith(kinds) and np.ptp(item) > 0}
     if not columns:
         return None

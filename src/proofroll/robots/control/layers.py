@@ -210,24 +210,24 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
             fit, off_stops, remark = rival
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
-    if fit.off > fit.bar and not fit.causes:
-        off = f"the forces are off by {error(fit.off)} of the largest"
-        noisy = noisy_layer(record, law, evidence.in_air.held, off)
-        if noisy is not None:
-            return noisy
-    if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
+    floats, off = "q_WB.w" in record.columns, f"the forces are off by {error(fit.off)} of the largest"
+    looked_at = fit.off > fit.bar and (floats or not fit.causes)
+    white = white_noise(record, efforts=not floats) if looked_at else None
+    if white is not None and not floats and (noisy := noisy_layer(record, law, evidence.in_air.held, off)) is not None:
+        return noisy
+    if fit.off > fit.bar and not (white and floats) and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
     fit = dataclasses.replace(fit, between=fit.between and not (stepwise or _rows_are_steps(record, law)))
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
-    white = None if fit.causes or fit.off <= fit.bar else white_noise(record)
-    if fit.between or white is not None:
-        off = f"the forces are off by {error(fit.off)} of the largest, and no cause is known"
+    hidden = white if floats or not fit.causes else None
+    if fit.between or hidden is not None:
         advice = f"steps between the rows may explain it: {assumed or 'log every step to decide'}"
-        if white is not None:
-            advice = f"white noise of up to {error(100 * white.part, 1)} % of a range may hide one: log more rows"
-        return Layer("acceleration", reason="; ".join(filter(None, (off, advice, remark))), undecided=True)
+        if hidden is not None:
+            advice = f"white noise of up to {error(100 * hidden.part, 1)} % of a range may hide one"
+        reason = "; ".join(filter(None, (f"{off}, and no cause is known", advice, remark)))
+        return Layer("acceleration", reason=reason, undecided=True, noise=0.0 if hidden is None else hidden.part)
     implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
     holds = fit.off <= fit.bar and not fit.causes
     if assumed and not holds and all(cause.after > fit.bar for cause in fit.causes):
