@@ -132,11 +132,12 @@ def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> 
         return None
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     reports = runtestprotocol(item, nextitem=nextitem, log=False)
-    last = reports[-1]
-    told = dict(last.user_properties)
-    if not told[_MARKED] and LIMIT < told[_TOOK] < FIRST_USE and all(not report.failed for report in reports):
-        again = runtestprotocol(item, nextitem=nextitem, log=False)[-1]
-        last.user_properties.append((_TOOK, min(told[_TOOK], dict(again.user_properties)[_TOOK])))
+    properties = dict(reports[-1].user_properties)
+    seconds = properties[_TOOK]
+    if not properties[_MARKED] and LIMIT < seconds < FIRST_USE and all(not report.failed for report in reports):
+        second_run = runtestprotocol(item, nextitem=nextitem, log=False)
+        seconds = min(seconds, dict(second_run[-1].user_properties)[_TOOK])
+        reports[-1].user_properties.append((_TOOK, seconds))
     for report in reports:
         item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)

@@ -321,6 +321,7 @@ def _tables(
         advice = "give [ground] feet = {LINK = radius}, or take --ground plane or none"
         raise InputError("ground", file.path, f"{near}; {advice}")
     left_out += [f"edges of {face}, which is endless for {_listed(shapes)}" for face, shapes in endless.items()]
+    left_out.append("pairs of shapes that come near only after 1 s, or in another motion")
     return GroundTables(list(geometries.values()), rows, _about(stands, others), left_out)
 
 

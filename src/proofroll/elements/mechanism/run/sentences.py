@@ -52,8 +52,7 @@ def start_facts(element: MechanismElement) -> Sequence[str]:
     gaps = dict[str, float]()  # the least one of each pair, which may have many points
     for contact, touch in zip(mechanism.contacts, touching, strict=True):
         gaps[contact.pair] = min(gaps.get(contact.pair, np.inf), touch.gap)
-    told = [f"{pair} {gap:.4g} m" for pair, gap in gaps.items()]
-    clauses += [f"gaps of pairs: {', '.join(told)}"] if told else []
+    clauses += [f"gaps of pairs: {', '.join(f'{pair} {gap:.4g} m' for pair, gap in gaps.items())}"] if gaps else []
     return [*clauses, FRAMES]
 
 
