@@ -341,7 +341,7 @@ def white_noise(record: ControlRecord, *, efforts: bool = True) -> WhiteNoise | 
             smoothed = replace(record, columns={**record.columns, **curves})
             part = float((noise / ranges).max())
             told = f"white noise of up to {error(100 * part, 1)} % of a range, smoothed over {width} rows, explains it"
-            return WhiteNoise(smoothed, part, told, smooth, width, kept)
+            return WhiteNoise(record=smoothed, part=part, told=told, smooth=smooth, width=width, kept=kept)
     return None
 
 
