@@ -10,14 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN
 from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall, energy, wall_velocity
-from proofroll.elements.mechanism.run.contacts.stretches import (
-    DEGREE,
-    ENDS,
-    FORCES,
-    accelerations,
-    carried,
-    stretches,
-)
+from proofroll.elements.mechanism.run.contacts.stretches import DEGREE, ENDS, FORCES, accelerations, carried, stretches
 
 if TYPE_CHECKING:
     import xarray as xr
