@@ -64,7 +64,7 @@ A cell is the largest distance up to that time of any body from the
 The first line of a table is the reference's own error bar: smaller distances are not told apart.
 s/s: seconds of computing for each second of motion, of one run on a busy machine, so to a factor of two.
 
-- `default`: what a MuJoCo model has that says nothing (Euler, 2 ms, soft contacts, pyramidal cone).
+- as installed (`default`): what a MuJoCo model has that says nothing (Euler, 2 ms, soft contacts, pyramidal cone).
 - `matched`: hard contacts and elliptic cones at 1 ms.
 - `tuned`: the same without the lift that MuJoCo's convex cone gives to feet that slide, with damping as armature.
 - Of an MJCF the first setting has the options of its own file; what the adapter sets otherwise, as the softness of its

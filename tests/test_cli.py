@@ -715,7 +715,7 @@ def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
     (page,) = (tmp_path / "out" / "stability").glob("*.html")
     text = page.read_text(encoding="utf-8")
     assert 'class="heat"' in text
-    assert "projection solver rotating frame, default" in text
+    assert "projection solver rotating frame, as installed" in text
 
 
 @pytest.mark.nightly

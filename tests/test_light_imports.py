@@ -9,8 +9,10 @@ from importlib.metadata import entry_points
 from importlib.util import find_spec
 
 import pytest
+from robot_templates import urdf
 
 ENGINES = ["projection", "reduced", *(name for name in ("exudyn", "mujoco") if find_spec(name))]
+READERS = [name for name in ("exudyn", "mujoco", "pinocchio") if find_spec(name)]
 # A command as a user gives it, with the exit code that it ends with.
 _COMMAND = """
 sys.argv = "proofroll {words}".split()
@@ -63,6 +65,14 @@ STEPS: dict[str, tuple[str, set[str]]] = {
     "no such scene": (_command("run nosuch --engine mujoco --set length=1", 2), {*_WRONG_NAME, "scipy"}),
     "no such parameter": (_command("run pendulum --engine mujoco --set lenth=1", 2), _WRONG_NAME),
     "check": (_command("check pendulum"), {"scipy", "xarray", "pandas", "matplotlib", "sympy"}),
+    "check a robot": (
+        f"open('arm.urdf', 'w').write({urdf()!r})\n{_command('check arm.urdf --engine mujoco')}",
+        {"scipy", "xarray", "pandas", "matplotlib", "proofroll.report.terminal.verdicts"},
+    ),
+    "readers of robots": (
+        "\n".join(f"import proofroll.robots.importers.{name}" for name in READERS),
+        {"scipy", *(f"proofroll.engines.{name}.adapter" for name in READERS)},
+    ),
     "describe engines": (
         f"from proofroll.running.identity import describe\nfor name in {ENGINES}:\n    describe(name)",
         {"xarray", "pandas", "scipy.integrate", "scipy.spatial", "scipy.optimize"},

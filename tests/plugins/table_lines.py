@@ -9,8 +9,9 @@ from proofroll.report.long_table import TableLine
 
 LINE = TableLine(
     study="arm", group="trees", scene="arm", place="", case="", own_case=True, until=1.0, row=0, engine="alpha",
-    version="1", formulation="joints", preset="default", setting="default", precision="double", own_equations=False,
-    resolution="dt", step=1e-3, status="done", message="", verdict="agrees", limit="within tolerance", quantity="x",
+    version="1", formulation="joints", preset="default", setting="as installed", precision="double",
+    own_equations=False, resolution="dt", step=1e-3, status="done", message="", verdict="agrees",
+    limit="within tolerance", quantity="x",
     unit="m", role="motion", headline=True, error=5e-4, truth_error_bar=1e-12, tolerance=1e-2, scale=1.0, order=2.0,
     cost=0.01, cost_low=None, cost_high=None, clean=True,
 )  # fmt: skip

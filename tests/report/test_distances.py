@@ -128,12 +128,12 @@ def test_page_terminal_and_json_show_the_table(content: ReportContent, parse: An
     text = " ".join(parse(whole(page(dataclasses.replace(content, comparisons=[comparison]), [[]]))).text.split())
     assert f"Distance from the reference at {point}" in text
     assert "Horizon: 1 mm until 0.3 s." in text
-    assert "up to [s]0.10.44s/s known to0.1 1e-30.2 1e-3 alpha fine, default, dt 1e-3 s5 0.02–0.01" in text
+    assert "up to [s]0.10.44s/s known to0.1 1e-30.2 1e-3 alpha fine, as installed, dt 1e-3 s5 0.02–0.01" in text
     out = io.StringIO()
     for part in verdict_parts(comparison):
         Console(file=out, width=80, highlight=False, markup=False).print(part)
     shown = " ".join(out.getvalue().split())
     assert f"from the reference at {point}, of any body [mm] and its attitude [rad]: up to 0.1 s 0.44 s s/s" in shown
-    assert "alpha fine, default, dt 1e-3 s 5 0.02 – 0.01" in shown
+    assert "alpha fine, as installed, dt 1e-3 s 5 0.02 – 0.01" in shown
     assert plain(comparison)["distances"][0]["lines"][1] == {"row": 1, "places": [5e-3, None], "turns": [0.02, None]}
     assert "Distance from the reference" not in parse(whole(page(content, [[]]))).text

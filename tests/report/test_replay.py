@@ -194,7 +194,7 @@ def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) ->
     assert content["start"] == 1, "the scene as its file has it"
     for case, numbers in zip(content["cases"], content["packed"], strict=True):
         names = {ball["name"]: ball["shown"] for ball in case["runs"]}
-        assert names == {"truth": True, "alpha fine, default, dt 1e-3 s": True, "beta only, dt 1e-3 s": True}
+        assert names == {"truth": True, "alpha fine, as installed, dt 1e-3 s": True, "beta only, dt 1e-3 s": True}
         bytes_said = sum(4 * width * length for _, _, width, length, _ in case["arrays"])
         assert len(gzip.decompress(base64.b64decode(numbers))) == bytes_said
     silent = next(i for i, ball in enumerate(content["cases"][0]["runs"]) if ball["name"].startswith("beta"))

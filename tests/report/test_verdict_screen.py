@@ -45,11 +45,12 @@ def off(row: ReportedRow, verdict: Verdict, error: float, **changes: Any) -> dic
 def test_the_answer_comes_first(content: ReportedComparison) -> None:
     """What is wrong, how many agree, and what was not expected stand in the first three lines."""
     found = lines(content)
-    assert found[0].startswith("alpha fine, default, dt 1e-3 s, is wrong: z is off by ")
+    assert found[0].startswith("alpha fine, as installed, dt 1e-3 s, is wrong: z is off by ")
     assert found[1].endswith(" engine settings agree.")
     assert found[2].startswith("Not as the file expects (1 of 2): ")
-    assert found[3] == ""
-    assert found[4].split() == ["setting", "worst", "error", "of", "allowed", "real", "time"]
+    words = "matched: documented options; an answer's best: the cheaper of matched, tuned."
+    assert found[3:5] == [f"as installed: the engine's own options; {words}", ""]
+    assert found[5].split() == ["setting", "worst", "error", "of", "allowed", "real", "time"]
 
 
 def test_rows_are_one_line_and_in_order(content: ReportedComparison) -> None:

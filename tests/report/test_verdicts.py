@@ -287,7 +287,7 @@ def test_rows_of_one_declared_scheme_are_named_whatever_their_errors(
     rows = [dataclasses.replace(row, scheme=said) for row, said in zip(content.rows, declared, strict=True)]
     said = (
         "Same integration scheme (agreement is not independent evidence): "
-        "alpha fine default, beta: semi-implicit Euler."
+        "alpha fine as installed, beta: semi-implicit Euler."
     )
     assert (said in told(dataclasses.replace(content, rows=rows))) is shared
 

@@ -123,7 +123,7 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
         "reporting all that is judged"
     )
     assert found[1].startswith(
-        "1 setting differs from the truth and runs to the end without a warning, worst alpha fine, default"
+        "1 setting differs from the truth and runs to the end without a warning, worst alpha fine, as installed"
     )
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a warning.")
     assert found[2] == "The fastest confirmed to hold 1e-4 of the path: alpha for sphere in cylinder (invented)."

@@ -71,10 +71,7 @@ def search_answers(
             for answer in answers_of(question, asked, engines, runner, out):
                 made.add_answer(
                     ReportedAnswer(
-                        answer=answer,
-                        study=outcome.comparison.name,
-                        group=place[1],
-                        sentence=taken_sentence(answer),
+                        answer=answer, study=outcome.comparison.name, group=place[1], sentence=taken_sentence(answer)
                     )
                 )
     made.write(out)

@@ -31,9 +31,7 @@ def judge(
     scene: Annotated[
         str | None,
         typer.Option(
-            help="The scene, or the path of its folder.",
-            autocompletion=options.scenes_like,
-            callback=options.own_first,
+            help="The scene, or the path of its folder.", autocompletion=options.scenes_like, callback=options.own_first
         ),
     ] = None,
     settings: options.Set = None,

@@ -65,11 +65,7 @@ def engine(
     folder = _fresh(name, package)
     if name in {*engine_names(), "truth"} or find_spec(package):
         raise InputError("name", name, f"an installed engine or its package has this name; {_ANOTHER}")
-    names = {
-        "name": name,
-        "package": package,
-        "Class": "".join(part.capitalize() for part in name.split("_")) or name,
-    }
+    names = {"name": name, "package": package, "Class": "".join(part.capitalize() for part in name.split("_")) or name}
     for template in sorted((_TEMPLATES / "engine").rglob("*")):
         if template.is_file():  # some end in .txt, so that tools do not take them for files of this project
             target = folder / template.relative_to(_TEMPLATES / "engine")
@@ -108,11 +104,7 @@ def probe(
         for joint, row in start.joints.items()
     )
     numbers = start.base and f"[{', '.join(f'{number:.9g}' for number in start.base)}]"
-    texts = {
-        "robot": _quoted(str(robot.resolve())),
-        "base": str(numbers),
-        "joints": f"{{\n{''.join(rows)}}}",
-    }
+    texts = {"robot": _quoted(str(robot.resolve())), "base": str(numbers), "joints": f"{{\n{''.join(rows)}}}"}
     file = Path(f"{name}.py")
     if file.exists():
         advice = "this file is there already; remove or move it, or run the command in another folder"

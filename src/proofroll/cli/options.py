@@ -146,9 +146,7 @@ def _read_below(context: typer.Context, root: Path | None) -> Path | None:
 Root = Annotated[
     Path | None,
     typer.Option(
-        "--root",
-        help="Folder of what a robot file includes and its meshes; by default its own.",
-        callback=_read_below,
+        "--root", help="Folder of what a robot file includes and its meshes; by default its own.", callback=_read_below
     ),
 ]
 
@@ -225,7 +223,8 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
 
         def line() -> str:
             now = progress.tasks[0]
-            return f"{now.description}: {now.completed:g}{'' if now.total is None else f' of {now.total:g}'}"
+            done = "" if now.total is None and not now.completed else f": {now.completed:g}"
+            return f"{now.description}{done}{'' if now.total is None else f' of {now.total:g}'}"
 
         with nullcontext() if moves else _now_and_then(line):
             yield lambda description, count=1, total=None: progress.update(
@@ -287,8 +286,7 @@ def _waited_for() -> str:
     asking = sys.modules.get("proofroll.running.engine_questions")  # not imported: no engine was asked
     names = dict.fromkeys(asking.waited_for) if asking else ()
     if names:
-        what = "what they are" if len(names) > 1 else "what it is"
-        return f": waiting for {', '.join(names)} to say {what}"
+        return f": waiting for {', '.join(names)} to start"
     running = sys.modules.get("proofroll.running.process")
     return "".join(f": {text}" for text in running.truths_at()) if running else ""
 

@@ -62,17 +62,15 @@ def answer_steps(
         engines = [*engines, engine]
         others = ", ".join(own_options.others)
         further = [f"Not compared, as the adapter has its own: {others}."] if others else []
-    facts = [engine_facts(engine, whole, runner) for engine in engines]
-    made = []
-    for engine, pair in zip(engines, facts, strict=True):
+    paths = {engine: answer_path(out, whole, asked, [f"step of {engine}"]) for engine in engines}
+    answers = {engine: None if runner.fresh else stored(path, StepAnswer) for engine, path in paths.items()}
+    facts = {engine: engine_facts(engine, whole, runner) for engine, answer in answers.items() if answer is None}
+    for engine, pair in facts.items():
         question = whole.sampled_for(pair[0].step)
-        path = answer_path(out, question, asked, [f"step of {engine}"])
-        answer = None if runner.fresh else stored(path, StepAnswer)
-        if answer is None:
-            with options.spinner(f"{engine} in {question.scene} over {question.until:g} s"):
-                answer = step_answer(question, asked, engine, pair, runner)
-            keep_study(answer, path)
-        made.append(answer)
+        with options.spinner(f"{engine} in {question.scene} over {question.until:g} s"):
+            answers[engine] = step_answer(question, asked, engine, pair, runner)
+        keep_study(answers[engine], paths[engine])
+    made = [answer for engine in engines if (answer := answers[engine]) is not None]
     if as_json:
         content = [{"sentence": step_sentence(item), **plain(item)} for item in made]
         options.write_json(content[0] if len(content) == 1 else content)

@@ -101,28 +101,39 @@ def _show(
 ) -> None:
     """Runs a scene in engines one after another, and writes the page after each.
 
+    Engines start, one after another, beside the imports and the first page.
+
     Raises:
         ProofrollError: the scene makes no sense, or no engine runs it.
     """
     import tempfile
+    from concurrent.futures import ThreadPoolExecutor
     from functools import partial
 
-    from proofroll.core.truth import truth
-    from proofroll.files.trajectory_file import STORED, import_xarray, read
-    from proofroll.running.runner import run_one
-    from proofroll.studies.cases import length_of, scene_of_run, single_case
+    from proofroll.running.engine_questions import prepare
 
-    import_xarray()
-    loaded, length = scene_of_run(scene, settings), length_of(scene, until)
-    every = max(_UNIT, round(length / _INTERVALS / _UNIT) * _UNIT)
+    page = partial(_write, out, scene, begun=time.monotonic())
     runs: list[xr.Dataset] = []
-    true: xr.Dataset | None = None
-    page = partial(_write, begun=time.monotonic())
-    with tempfile.TemporaryDirectory() as folder:
+    truths: list[xr.Dataset] = []
+    untold, asked = "its truth is still being computed", 0
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(1) as pool:
+        ready = {engines[0]: pool.submit(prepare, engines[0], workers)}
+        from proofroll.core.pace import PACE
+        from proofroll.core.truth import truth
+        from proofroll.files.trajectory_file import STORED, import_xarray, read
+        from proofroll.report.page import html  # noqa: F401 -- imported while the engine starts
+        from proofroll.running.runner import run_one
+        from proofroll.studies.cases import length_of, scene_of_run, single_case
+
+        import_xarray()
+        loaded, length = scene_of_run(scene, settings), length_of(scene, until)
+        ready |= {name: pool.submit(prepare, name, workers) for name in engines if name not in ready}
+        every = max(_UNIT, round(length / _INTERVALS / _UNIT) * _UNIT)
         for name in engines:
+            ready[name].result()
+            target = Path(folder) / f"{len(runs)}{STORED}"
             try:
                 case = single_case(scene, settings, name, until=length, every=every, time_limit=_LIMIT, workers=workers)
-                target = Path(folder) / f"{len(runs)}{STORED}"
                 result = run_one(case, target, workers)
             except ProofrollError as problem:
                 options.complain(f"{name}: {problem}")
@@ -131,11 +142,16 @@ def _show(
                 options.complain(f"{name} {result.status}: {result.message}")
                 continue
             runs.append(read(target).load())
-            if true is None:
-                page(out, scene, runs, untold="its truth is still being computed")
+            if not asked:
+                page(runs, untold=untold)
             longest = max((run["time"].to_numpy() for run in runs), key=len)
-            if true is None or true.sizes["time"] < len(longest):
-                true = truth(loaded.fully_asked, longest)
-            page(out, scene, runs, true=true)
+            if asked < len(longest):
+                asked = len(longest)
+                try:
+                    with PACE.limited(_LIMIT):
+                        truths = [truth(loaded.fully_asked, longest)]
+                except ProofrollError as problem:
+                    untold = str(problem)
+            page(runs, true=truths[-1]) if truths else page(runs, untold=untold)
     if not runs:
         raise ProofrollError(f"{scene}: no engine runs it; proofroll engines tells what is installed")

@@ -56,10 +56,7 @@ _OF_SCENES: tuple[Callable[[Subject], None], ...] = (
     building.builds_only_what_is_required,
 )
 # Checks that run once per formulation, preset and such a scene with a truth.
-_OF_TRUTHS: tuple[Callable[[Subject], None], ...] = (
-    response.first_steps_fit_the_scene,
-    response.moves_as_the_truth,
-)
+_OF_TRUTHS: tuple[Callable[[Subject], None], ...] = (response.first_steps_fit_the_scene, response.moves_as_the_truth)
 # Checks that run once per formulation and preset, on the first scene that is not refused.
 _OF_PRESETS: tuple[Callable[[Subject], None], ...] = (
     building.samples_are_well_formed,

@@ -49,6 +49,16 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return product
 
 
+def hermite(grid: FloatArray, values: FloatArray, rates: FloatArray, times: FloatArray) -> FloatArray:
+    """Cubic interpolation of samples with their rates, shape (grid, …), at times within the grid; shape (times, …)."""
+    index = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, len(grid) - 2)
+    rows = (-1, *[1] * (values.ndim - 1))
+    step = np.diff(grid)[index].reshape(rows)
+    s = (times - grid[index]).reshape(rows) / step
+    bent = s * (1 - s) * step * ((1 - s) * rates[index] - s * rates[index + 1])
+    return np.asarray(values[index] + s * s * (3 - 2 * s) * (values[index + 1] - values[index]) + bent)
+
+
 def slices(counts: Iterable[int]) -> tuple[slice, ...]:
     """Slices of consecutive parts with the given sizes."""
     ends = itertools.accumulate(counts, initial=0)

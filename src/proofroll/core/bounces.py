@@ -121,10 +121,7 @@ def _apex(course: Course, body: int, start: float, samples: np.ndarray[tuple[int
 
 
 def exact_bounces(
-    sampled: Callable[[FloatArray], Course],
-    events: Sequence[Event],
-    bodies: Mapping[str, int],
-    end: float,
+    sampled: Callable[[FloatArray], Course], events: Sequence[Event], bodies: Mapping[str, int], end: float
 ) -> list[Bounce]:
     """Bounces of a motion that can be sampled at any time up to ``end`` [s], of its first impacts, at most 100."""
     sharp = [replace(event, time_low=event.time, time_high=event.time) for event in events if event.kind in IMPACTS]

@@ -35,10 +35,7 @@ class CommandedEngine:
     def _set(self, t: float) -> None:
         wall, processor = time.perf_counter(), time.process_time()
         values = self._commands.values(t, self.engine.sample())
-        self.asking = (
-            self.asking[0] + time.perf_counter() - wall,
-            self.asking[1] + time.process_time() - processor,
-        )
+        self.asking = (self.asking[0] + time.perf_counter() - wall, self.asking[1] + time.process_time() - processor)
         self.engine.drive(values)
         self._next = self._commands.next_instant(t)
 

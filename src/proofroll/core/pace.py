@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from proofroll.core.errors import Diverged
 
 _EVERY = 1.0  # s of processor time between two messages
+_TELLING = 0.01  # part of a route from which its pace is told: the first steps are shorter than those to come
 AT = "truth at "  # beginning of a line that a worker prints about it
 # Route -> part of the limit that is used when it ends; of a smooth motion the second is followed twice, and sampled.
 _ROUTES = {"first": 0.5, "second": 1.0}
@@ -24,7 +25,8 @@ class Pace:
 
     Attributes:
         until: last time of the truth [s].
-        text: time that is reached and time that is still needed, or that routes have ended; empty: no truth is made.
+        text: time that is reached and, after the first steps, time that is still needed, or that routes have ended;
+            empty: no truth is made.
         over: True if the last truth was ended by its limit.
         aloud: True in a worker, whose lines the process that started it reads.
     """
@@ -84,7 +86,8 @@ class Pace:
         if came > 0 and used - self._told > _EVERY:
             self._told, whole = used, (used - self._begun[0]) / came
             left = whole * (1 - part) + (whole if self._route == "first" else 0.0)
-            self.text = f"{part * self.until:.3g} of {self.until:.3g} s, about {left:.0f} s left"
+            forecast = f", about {left:.0f} s left" if came > _TELLING else ""
+            self.text = f"{part * self.until:.3g} of {self.until:.3g} s{forecast}"
             self._tell(self.text)
 
 

@@ -14,7 +14,7 @@ from typing import Any, TypeGuard
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, error, number
 from proofroll.files.atomic import ordinary_content
-from proofroll.report.labels import step
+from proofroll.report.labels import INSTALLED, step
 from proofroll.report.long_table import COLUMNS, TableLine
 
 # Changes of an error that count as round-off of another build: relative to the quantity's size, and to the error.
@@ -219,7 +219,7 @@ def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[
     rows: dict[tuple[str, str, str], dict[int, dict[str, TableLine]]] = defaultdict(dict)
     for line in lines:
         size = step(line.resolution, line.step, 6)
-        run = " ".join(filter(None, (line.engine, line.formulation, line.setting, size)))
+        run = " ".join(filter(None, (line.engine, line.formulation, line.setting.replace("default", INSTALLED), size)))
         rows[line.study, line.place, run].setdefault(line.row, {})[line.quantity] = line
     return {(*key, number): run for key, of_row in rows.items() for number, run in enumerate(of_row.values())}
 

@@ -35,6 +35,7 @@ SYMBOLS = {
     "differs": "✗",
     "failed": "!",
 }
+INSTALLED = "as installed"
 MEANINGS = {
     "agrees": "within tolerance at this step; where there is a ladder of steps, so is its limit",
     "unconfirmed": "agrees at this step, limit not confirmed: the ladder of steps is not accurate enough",
@@ -187,6 +188,11 @@ def names(rows: Sequence[Setting]) -> list[str]:
     return [name if short.count(name) == 1 else str(row.engine) for name, row in zip(short, rows, strict=True)]
 
 
+def preset_name(preset: str | None) -> str:
+    """Preset of a run for a reader: ``as installed`` for ``default``; empty without one."""
+    return INSTALLED if preset == "default" else preset or ""
+
+
 def setting_words(engine: str, facts: EngineFacts | SweptSetting) -> str:
     """Preset, further options that a file or user set (``cone=pyramidal``), and ``f32`` for single precision.
 
@@ -198,7 +204,7 @@ def setting_words(engine: str, facts: EngineFacts | SweptSetting) -> str:
     chosen: list[str] = []
     with suppress(InputError):  # a stored study may have any text
         chosen = [f"{key}={value}" for key, value in parse_engine(engine).options.items() if key not in usual]
-    shown = [] if preset is None or (chosen and preset == "matched") else [preset]
+    shown = [] if preset is None or (chosen and preset == "matched") else [preset_name(preset)]
     return " ".join([*shown, *chosen, *precision_words(facts.precision)])
 
 

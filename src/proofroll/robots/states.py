@@ -12,6 +12,7 @@ import dataclasses
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
+from proofroll.elements.mechanism.scene.rotations import from_quaternion
 from proofroll.robots.model import Array, Robot
 
 # Least speed of a joint: slower ones might stick where an engine smooths Coulomb friction [rad/s or m/s].
@@ -72,8 +73,6 @@ class RobotStates:
 
 def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
     """Random states within the limits of the joints (or ±π, ±1 m), with moderate velocities, consistent with mimics."""
-    from scipy.spatial.transform import Rotation
-
     random = np.random.default_rng(seed)
     angle, rotation, position = {}, {}, {}
     for joint in robot.moving:
@@ -84,7 +83,8 @@ def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
             usable = (ends for ends in (near, limits) if ends[0] < ends[1])
             angle[joint.name] = random.uniform(*next(usable, (-reach, reach)), count)
         else:
-            rotation[joint.name] = np.asarray(Rotation.random(count, rng=random).as_matrix())
+            vector_first = random.normal(size=(count, 4))  # scaled to unit length, uniform over all rotations
+            rotation[joint.name] = np.array([from_quaternion(q) for q in np.roll(vector_first, 1, axis=1)])
             if joint.kind == JointKind.FREE:
                 position[joint.name] = random.uniform(-1, 1, (count, 3))
     velocity = {

@@ -10,13 +10,12 @@ from proofroll.core.formulations import FORMULATIONS
 from proofroll.core.plugins import GROUP, load_engine, place_of, plain_name, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.source_code import OWN
-from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case
 from proofroll.running.integrity import watch
 from proofroll.running.program import engine, path_of
 
 # Scenes that a process keeps, as most cases are of few.
-_SCENES = 8
+_SCENES = 32
 # Place that this process serves: the part after ``@`` of its engines; empty: engines of this interpreter.
 _settled = ""
 # True in a worker: engines of other packages are watched there.
@@ -95,4 +94,6 @@ def scene_of(case: Case) -> Scene:
 @lru_cache(maxsize=_SCENES)
 def _scene(name: str, _digest: str, asks: tuple[str, ...], parameters: tuple[tuple[str, float], ...]) -> Scene:
     """One of the last scenes of this process; engines get copies of them."""
+    from proofroll.files.scene_file import load_scene  # which a reader of robot files does not need
+
     return load_scene(name, asks=asks, **dict(parameters))

@@ -36,16 +36,16 @@ def test_it_says_how_far_a_truth_has_come() -> None:
 
 
 def test_what_comes_before_a_route_says_nothing_of_its_pace(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A route that compiles for a minute and then comes far in a second is nearly over."""
+    """A route that compiles for a minute and then comes far in a second is nearly over; short first steps tell none."""
     clock, told = [0.0], list[str]()
     monkeypatch.setattr("proofroll.core.pace.time.process_time", lambda: clock[0])
     pace = Pace()
     pace.until = 1.0
     with pace.limited(1000.0, told.append):
         pace.follow("second", 1.0)
-        for clock[0], reached in ((60.0, 0.0), (61.5, 0.5)):
+        for clock[0], reached in ((60.0, 0.0), (61.5, 1e-5), (63.0, 0.5)):
             pace.reached(reached)
-    assert told == ["0.5 of 1 s, about 2 s left", ""]
+    assert told == ["1e-05 of 1 s", "0.5 of 1 s, about 3 s left", ""]
 
 
 def follow_on(pace: Pace) -> None:

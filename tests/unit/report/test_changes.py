@@ -44,6 +44,8 @@ def test_the_same_numbers_have_not_changed() -> None:
     assert held(changed(1, error=3e-13)).changes == []
     assert held(changed(2, error=2.5e-9)).changes == [], "round-off of another processor"
     assert held(changed(0, truth_error_bar=1e-3, error=6e-4)).changes == [], "within the truth's bar"
+    earlier = [replace(LINE, setting="default")]
+    assert held([replace(LINE, setting="as installed")], old=earlier).compared == 1, "earlier reports have its own name"
     endless = [replace(LINE, error=math.inf)]
     assert held(endless, old=[replace(LINE, error=None)]).changes == [], "a file has none for what is not finite"
 
@@ -63,7 +65,7 @@ def test_the_same_numbers_have_not_changed() -> None:
 def test_one_change_is_found_and_nothing_else(values: dict[str, Any], kind: str, says: str) -> None:
     """One per cent of an error, a verdict, the end of a run, a cost beyond its interval: the run is named."""
     found = held(changed(0, **values))
-    assert [(item.run, item.kind) for item in found.changes] == [("alpha joints default dt 1e-3 s", kind)]
+    assert [(item.run, item.kind) for item in found.changes] == [("alpha joints as installed dt 1e-3 s", kind)]
     assert found.changes[0].says[0] == says
     assert found.changed
 
@@ -117,7 +119,9 @@ def test_costs_without_intervals_show_how_the_machine_scatters() -> None:
 
 def test_runs_that_are_gone_count_and_new_ones_do_not() -> None:
     """A run that is not made any more is a change; one that is new is told; other studies are left alone."""
-    assert [(item.kind, item.run) for item in held(LINES[:2]).changes] == [("gone", "beta joints default dt 1e-3 s")]
+    assert [(item.kind, item.run) for item in held(LINES[:2]).changes] == [
+        ("gone", "beta joints as installed dt 1e-3 s")
+    ]
     assert held(LINES[:2]).changed
     more = held([*LINES, replace(LINE, row=2, engine="gamma")])
     assert [item.kind for item in more.changes] == ["new"]
@@ -154,9 +158,9 @@ def test_runs_that_changed_alike_share_a_line() -> None:
     head, versions, both, other = found.lines
     assert head.startswith("Against old.json of 2026-01-01. Of 3 runs in both reports, changed: 2 verdicts, 1 errors")
     assert versions == "Other versions: alpha 1 → 2."
-    runs = "arm: alpha joints default dt 1e-3 s; chain: alpha joints default dt 1e-3 s"
+    runs = "arm: alpha joints as installed dt 1e-3 s; chain: alpha joints as installed dt 1e-3 s"
     assert both == f"!! {runs}: x agrees → another-scene; z agrees → another-scene (2 runs)"
-    assert other == "!! arm: beta joints default dt 1e-3 s: error of x 2e-9 → 2e-3 m"
+    assert other == "!! arm: beta joints as installed dt 1e-3 s: error of x 2e-9 → 2e-3 m"
 
 
 def test_a_comment_has_each_change_once() -> None:
@@ -165,7 +169,7 @@ def test_a_comment_has_each_change_once() -> None:
     head, versions, table = crashed.markdown.strip().split("\n\n")
     assert head == f"**proofroll**, against the report of 2026-01-01: {crashed.sentence}"
     assert versions == "Other versions: alpha 1 → 2."
-    assert table.splitlines()[2:] == ["| done → crashed: a\\|b | arm: beta joints default dt 1e-3 s |"]
+    assert table.splitlines()[2:] == ["| done → crashed: a\\|b | arm: beta joints as installed dt 1e-3 s |"]
     same = held(LINES).markdown
     assert "|" not in same
 

@@ -170,7 +170,7 @@ def test_a_program_that_does_not_answer_is_asked_once(tmp_path: Path) -> None:
 def test_a_program_that_is_waited_for(
     command: str, command_line: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A command says now and then that it waits for a program to say what it is."""
+    """A command says now and then that it waits for a program to start."""
     program = script(tmp_path / "rod", "read -r line; sleep 0.7; exit 1")
     monkeypatch.setattr("proofroll.cli.options._SAID_EVERY", 0.1)
     row = f'[[rows]]\nengine = "rod@program:{program}"\nexpect = "agrees"\ntolerance = "any"\n'
@@ -181,4 +181,4 @@ def test_a_program_that_is_waited_for(
     out = [] if command == "run" else ["--out", str(tmp_path / "out")]
     code, _, err = command_line(command, asked, "--engine", f"rod@program:{program}", *out)
     assert code == 3
-    assert re.search(rf"waiting for .*rod@program:{program}.* to say what", err)
+    assert re.search(rf"waiting for .*rod@program:{program}.* to start", err)

@@ -69,6 +69,7 @@ def _onset_table(study: OnsetStudy) -> Table:
 
     from proofroll.core.number_format import number
     from proofroll.papers.blajer_2006.slip.onset import first_slip_texts
+    from proofroll.report.labels import preset_name
     from proofroll.report.terminal.screen import numeric, plain_table, unbroken
     from proofroll.running.case import Status
 
@@ -82,7 +83,7 @@ def _onset_table(study: OnsetStudy) -> Table:
     for item in study.engines:
         slip_texts = first_slip_texts(item.onset) if item.onset or item.status is Status.DONE else ("", "")
         verdict = item.verdict + (f": {item.message}" if item.verdict in {"failed", "refused"} else "")
-        label = (item.name, *(item.settings.get(key, "") for key in ("formulation", "preset")))
+        label = item.name, item.settings.get("formulation"), preset_name(item.settings.get("preset"))
         table.add_row(Text(" ".join(filter(None, label))), *slip_texts, number(item.difference), Text(verdict))
     return table
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from proofroll.core.number_format import number
 from proofroll.core.plugins import parse_engine
-from proofroll.report.answer.sentences import INSTALLED, tolerance_words
-from proofroll.report.labels import engine_words
+from proofroll.report.answer.sentences import tolerance_words
+from proofroll.report.labels import engine_words, preset_name
 from proofroll.report.styles import DASHES, engine_colours
 from proofroll.running.case import Status
 from proofroll.studies.answer.records import SceneAnswer, SettingTried
@@ -53,7 +53,7 @@ def lines_of(made: SceneAnswer) -> list[DrawnSetting]:
         for tried in engine.settings:
             options = parse_engine(tried.spec).options
             formulation = str(options.get("formulation", ""))
-            preset = str(options.get("preset", "")).replace("default", INSTALLED)
+            preset = preset_name(options.get("preset"))
             points = [*_points(tried)]
             if points:
                 dash = formulations.setdefault(formulation, len(formulations)) % len(DASHES)

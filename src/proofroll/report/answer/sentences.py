@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from proofroll.core.number_format import number
 from proofroll.core.plugins import parse_engine
 from proofroll.files.scene_sources import root_words
-from proofroll.report.labels import engine_title, engine_words, step, symbol
+from proofroll.report.labels import INSTALLED, engine_title, engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
 from proofroll.report.run.last_values import FORCES
 from proofroll.running.case import Status
@@ -34,7 +34,6 @@ SIGNS = {
     State.SILENT: ("◐", "not reported"),
     State.NOT_RUN: ("·", "not run"),
 }
-INSTALLED = "as installed"
 _QUANTITIES = {"p_WB": "body positions"}
 # Least ratio of two speeds that is told.
 _FASTER = 1.1

@@ -83,10 +83,8 @@ def distance_cells(item: Distances, rows: Sequence[ReportedRow], runs: Sequence[
     there = [run for run in runs if run.point == item.point]
     costs = {run.row: run.rough_cost if run.seconds_per_second is None else run.seconds_per_second for run in there}
     for line in item.lines:
-        pairs = zip(line.places, line.turns, strict=True)
-        cells = [
-            "–" if place is None else f"{error(1e3 * place)} {error(turn * (turn > _ROUND_OFF))}"
-            for place, turn in pairs
-        ]
+        turns = [None if turn is None else turn * (turn > _ROUND_OFF) for turn in line.turns]
+        pairs = zip(line.places, turns, strict=True)
+        cells = ["–" if place is None else f"{error(1e3 * place)} {error(turn)}" for place, turn in pairs]
         name, cost = ("known to", "") if line.row is None else (names(rows)[line.row], number(costs.get(line.row)))
         yield [name, *cells, cost]

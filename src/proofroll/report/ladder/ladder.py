@@ -215,7 +215,7 @@ def _conclusions(content: LadderContent) -> Iterator[str]:
     ]
     if useful:
         rungs = "; ".join(f"{label(rung)} ({number(rung.ran.error)} {unit})" for rung in front(useful))
-        yield f"Nothing is both cheaper and nearer to the true {name} than, from the cheapest on: {rungs}."
+        yield f"The nearest to the true {name} for their cost, from the cheapest on: {rungs}."
     if content.tolerance is not None:
         yield _cheapest(useful, content.tolerance, f"{content.tolerance:g} {unit}")
     yield from _of_terms(content)

@@ -63,11 +63,7 @@ def three_sentences(
     answers: Sequence[ReportedAnswer],
 ) -> list[str]:
     """Three sentences: agreement, silent disagreement (also of the maps in ``entries``), and advice."""
-    return [
-        _agrees(comparisons),
-        _silent(comparisons, kept(comparisons, entries)),
-        answers_sentence(answers),
-    ]
+    return [_agrees(comparisons), _silent(comparisons, kept(comparisons, entries)), answers_sentence(answers)]
 
 
 def _agrees(comparisons: Sequence[ReportedComparison]) -> str:

@@ -40,12 +40,7 @@ def studies_page(content: ReportContent, pictures: Mapping[str, str]) -> str:
     """HTML page of the further studies, from a report's content and markup of their pictures by name."""
     screen = first_screen.FirstScreen(content)
     whole = rendered(
-        templates(),
-        "studies_page.html",
-        content=content,
-        pictures=pictures,
-        screen=screen,
-        datatables=_datatables(),
+        templates(), "studies_page.html", content=content, pictures=pictures, screen=screen, datatables=_datatables()
     )
     return folded(whole)
 

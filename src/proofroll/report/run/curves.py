@@ -126,11 +126,7 @@ def _panel(title: str, times: FloatArray, run: FloatArray, true: FloatArray | No
         return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
 
     return CurvePanel(
-        title=title,
-        low=number(low, 3),
-        high=number(high, 3),
-        run=line(run),
-        true="" if true is None else line(true),
+        title=title, low=number(low, 3), high=number(high, 3), run=line(run), true="" if true is None else line(true)
     )
 
 

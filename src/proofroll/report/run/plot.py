@@ -27,11 +27,7 @@ def read_run(path: Path) -> xr.Dataset:
     try:
         dataset = read(path)
     except FileNotFoundError:
-        raise InputError(
-            "run",
-            path,
-            "no such file or kept run; proofroll replay lists these",
-        ) from None
+        raise InputError("run", path, "no such file or kept run; proofroll replay lists these") from None
     except (OSError, ValueError, TypeError, KeyError):
         raise InputError("run", path, "no run in netCDF or npz; proofroll run … --out writes one") from None
     if not names_of_curves(dataset):

@@ -18,7 +18,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.report.kinds import kind_of, report_kinds
-from proofroll.report.labels import engine_words, settings_text, step
+from proofroll.report.labels import engine_words, preset_name, settings_text, step
 from proofroll.report.replay.library import three
 from proofroll.report.replay.records import Ghost, Replay, ReplayCase, Replayed, ReplayKind
 from proofroll.report.replay.replay import case_content, distance
@@ -210,7 +210,7 @@ def _name(run: xr.Dataset) -> str:
     """Engine, formulation, preset and step of a run for a reader."""
     settings = json.loads(run.attrs["settings"])
     named = engine_words(str(run.attrs["engine"]), str(settings.get("formulation") or ""))
-    return ", ".join(filter(None, (named, settings.get("preset"), step("dt", settings.get("dt")))))
+    return ", ".join(filter(None, (named, preset_name(settings.get("preset")), step("dt", settings.get("dt")))))
 
 
 def _ghosts(runs: Sequence[xr.Dataset], true: xr.Dataset) -> list[Ghost]:

@@ -19,7 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
-from proofroll.report.labels import engine_words, omitted_lines, precision_words, settings_text, step
+from proofroll.report.labels import engine_words, omitted_lines, precision_words, preset_name, settings_text, step
 from proofroll.report.run.last_values import FORCES, bounce_table, short_names, value_table
 from proofroll.running.case import Case, Result, Status
 from proofroll.studies.judging.quiet import quiet
@@ -170,9 +170,10 @@ def _event_text(event: Event) -> str:
 
 def _ended_words(content: RunContent, engine: str) -> str:
     """Sentence on the end of a run: who reached what time, how fast, and the time before the first step."""
-    words = engine_words(content.engine, content.settings.get("formulation"), engine), content.settings.get("preset")
-    resolution = [name for name in ("dt", "rtol") if content.settings.get(name) is not None][:1]
-    steps = [step(name, content.settings[name]) for name in resolution]
+    settings = content.settings
+    words = engine_words(content.engine, settings.get("formulation"), engine), preset_name(settings.get("preset"))
+    resolution = [name for name in ("dt", "rtol") if settings.get(name) is not None][:1]
+    steps = [step(name, settings[name]) for name in resolution]
     title = ", ".join(filter(None, (*words, *precision_words(content.precision), *steps)))
     if content.status != Status.DONE or content.engine == "truth":
         return f"{title}: {content.message}; {number(content.wall_seconds)} s of computing"

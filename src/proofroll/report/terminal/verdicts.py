@@ -80,9 +80,10 @@ def verdict_parts(
     yield from answer_lines(content, [row for row, _ in engines])
     yield from omitted_lines(content.omitted)
     yield from [f"{content.step_bound}."] if content.step_bound else []
+    listed = engines + [pair for pair in rows if witnesses and pair not in engines]
+    yield from _presets_lines({row.preset for row, _ in listed})
     yield ""
     yield f"  {'setting':{_SETTING}}{'worst error of allowed':{_ERROR}}{'real time':>{_SPEED}}"
-    listed = engines + [pair for pair in rows if witnesses and pair not in engines]
     for row, runs in sorted(listed, key=lambda pair: _rank(pair[0])):
         yield from row_lines(row, runs, [item for item, _ in listed], orders=orders)
     for item in content.spread:
@@ -91,6 +92,14 @@ def verdict_parts(
         yield from ("", *distance_parts(distances, content))
     yield ""
     yield from closing_lines(content, [row for row, _ in engines], orders=orders)
+
+
+def _presets_lines(presets: set[str | None]) -> Iterator[str]:
+    """Line on the words for settings in the rows, in those of an answer; none without presets."""
+    clauses = ["as installed: the engine's own options"] if "default" in presets else []
+    if documented := " and ".join(name for name in ("matched", "tuned") if name in presets):
+        clauses.append(f"{documented}: documented options; an answer's best: the cheaper of matched, tuned")
+    yield from [f"{'; '.join(clauses)}."] if clauses else []
 
 
 def _rank(row: ReportedRow) -> tuple[bool, int, float]:

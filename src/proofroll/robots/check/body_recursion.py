@@ -4,10 +4,9 @@ M comes column by column. Source: Featherstone, Rigid Body Dynamics Algorithms, 
 """
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.elements.mechanism.scene.rotations import skews
+from proofroll.elements.mechanism.scene.rotations import from_rotation_vector, skews
 from proofroll.robots.check.two_formulations import Dynamics, Frames, armature, turned_armature
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import RobotStates
@@ -66,7 +65,7 @@ def within(joint: RobotJoint, states: RobotStates) -> tuple[Array, Array]:
     slid = np.zeros((count, 3))
     turned = np.broadcast_to(np.eye(3), (count, 3, 3))
     if joint.kind == JointKind.REVOLUTE:
-        turned = Rotation.from_rotvec(states.angle[joint.name][:, None] * joint.axis).as_matrix()
+        turned = from_rotation_vector(states.angle[joint.name][:, None] * joint.axis)
     elif joint.kind == JointKind.PRISMATIC:
         slid = states.angle[joint.name][:, None] * joint.axis
     elif joint.kind == JointKind.SPHERICAL:

@@ -10,14 +10,13 @@ from rich.text import Text
 from proofroll.core.number_format import counted, error
 from proofroll.report.labels import SYMBOLS, engine_title
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
-from proofroll.report.terminal.verdicts import STYLES
 from proofroll.robots.check.layers import SHORT
 from proofroll.robots.check.records import AgainstCheck, HeldLayer, ImporterRow, RobotCheck
 from proofroll.robots.files.robot_file import LintRemark
 
 WIDTH = 80
 _MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": SYMBOLS["refused"], "missing": " "}
-_COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": STYLES["refused"]}
+_COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": "magenta"}
 
 
 def check_parts(content: RobotCheck) -> Iterator[Table | str]:

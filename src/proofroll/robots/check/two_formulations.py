@@ -11,13 +11,12 @@ import dataclasses
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism, Tree
 from proofroll.elements.mechanism.scene.checks import ZERO, Z
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
-from proofroll.elements.mechanism.scene.rotations import skews
+from proofroll.elements.mechanism.scene.rotations import skews, to_quaternion
 from proofroll.robots.model import NO_BODY, Array, Robot
 from proofroll.robots.states import RobotStates
 
@@ -126,7 +125,7 @@ class TreeMotion:
                 q[:, at_q.start], T[:, at_v, columns] = states.angle[joint.name], 1.0
                 continue
             R = states.rotation[joint.name]
-            q[:, at_q.stop - 4 : at_q.stop] = Rotation.from_matrix(S.T @ R @ S).as_quat(scalar_first=True)
+            q[:, at_q.stop - 4 : at_q.stop] = to_quaternion(S.T @ R @ S)
             T[:, at_v, columns] = S.T if joint.dofs == 3 else np.kron(np.eye(2), R.swapaxes(1, 2))
             if joint.kind == JointKind.FREE:
                 q[:, at_q.start : at_q.start + 3] = joint.position + states.position[joint.name]

@@ -9,8 +9,8 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from proofroll.elements.mechanism.scene.rotations import about
 from proofroll.robots.hypotheses import LEAST, WRITE_INERTIALS, RobotEvidence, hypothesis, with_weightless
 from proofroll.robots.model import NO_BODY, Array, Robot, RobotBody, composed
 
@@ -213,19 +213,19 @@ def _principal(inertia: Array) -> tuple[Array, Array]:
     for _ in range(500):
         turned = axes.T @ inertia @ axes
         off = {2: (0, 1), 1: (0, 2), 0: (1, 2)}
-        about = max(off, key=lambda axis: (abs(turned[off[axis]]), -axis))
-        i, j = off[about]
+        axis = max(off, key=lambda axis: (abs(turned[off[axis]]), -axis))
+        i, j = off[axis]
         if abs(turned[i, j]) < _SMALL:
             break
         tau = (turned[j, j] - turned[i, i]) / (2 * turned[i, j])
         tangent = (1 if tau >= 0 else -1) / (abs(tau) + np.hypot(1, tau))
-        angle = np.arctan(tangent) * (1 if about == 1 else -1)
-        axes = axes @ Rotation.from_rotvec(angle * np.eye(3)[about]).as_matrix()
+        angle = np.arctan(tangent) * (1 if axis == 1 else -1)
+        axes = axes @ about(axis, angle)
     moments = np.diag(axes.T @ inertia @ axes).copy()
     for column in (0, 1, 0):
         if moments[column] + _SMALL < moments[column + 1]:
             moments[[column, column + 1]] = moments[[column + 1, column]]
-            axes = axes @ Rotation.from_rotvec(np.pi / 2 * np.eye(3)[(column + 2) % 3]).as_matrix()
+            axes = axes @ about((column + 2) % 3, np.pi / 2)
     return moments, axes
 
 

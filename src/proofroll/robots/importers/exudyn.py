@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.elements.mechanism.scene.rotations import about, from_z, to_rpy
 from proofroll.engines.exudyn.integration import new_system
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items, new_settings
 from proofroll.robots.model import NO_BODY, Array, RobotJoint
@@ -83,7 +83,7 @@ def _turn(joint: RobotJoint) -> Array:
     """Axes of the tree's link in the child's frame: z along the joint's axis; for ball and free joints identity."""
     if joint.dofs > 1:
         return np.eye(3)
-    return np.asarray(Rotation.align_vectors(joint.axis[None], [[0, 0, 1]])[0].as_matrix())
+    return from_z(joint.axis)
 
 
 class _Tree:
@@ -158,12 +158,12 @@ class _Tree:
                 continue
             R = states.rotation[joint.name][k]
             turned = slice(columns.stop - 3, columns.stop)
-            q[turned] = angles = Rotation.from_matrix(R).as_euler("XYZ")
+            q[turned] = angles = -np.array(to_rpy(R.T))  # R = Rx(a) Ry(b) Rz(c)
             if joint.kind == JointKind.FREE:
                 q[columns.start : turned.start], R = states.position[joint.name][k], np.eye(3)
             x = np.array([1.0, 0.0, 0.0])
-            y = Rotation.from_euler("X", angles[0]).apply([0.0, 1.0, 0.0])
-            z = Rotation.from_euler("XY", angles[:2]).apply([0.0, 0.0, 1.0])
+            y = about(0, angles[0])[:, 1]
+            z = (about(0, angles[0]) @ about(1, angles[1]))[:, 2]
             inverse = np.linalg.inv(np.column_stack([x, y, z]))
             # the common angular velocity of a free joint has world axes, that of a ball joint the child's axes
             T[turned, turned] = inverse @ R

@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.scene.rotations import to_quaternion
 from proofroll.robots.model import Array
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
@@ -170,6 +170,6 @@ def _state(
                 T[iv : iv + 3, iv : iv + 3] = T[iv + 3 : iv + 6, iv + 3 : iv + 6] = R.T
                 drift[iv : iv + 3] = -R.T @ np.cross(v[iv + 3 : iv + 6], v[iv : iv + 3])
                 iq += 3
-            q[iq : iq + 4] = Rotation.from_matrix(R).as_quat()
+            q[iq : iq + 4] = np.roll(to_quaternion(R), -1)
         iv += dof
     return pin.integrate(model, q, step), T @ v, T, drift

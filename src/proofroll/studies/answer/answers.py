@@ -21,14 +21,7 @@ from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import time_in_rounds
 from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion
-from proofroll.studies.answer.records import (
-    AllowedError,
-    EngineAnswer,
-    SceneAnswer,
-    SettingTried,
-    StepTried,
-    ranked,
-)
+from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, SettingTried, StepTried, ranked
 from proofroll.studies.answer.search import (
     EngineSearch,
     SearchesAbreast,
@@ -296,11 +289,7 @@ def _step_tried(item: SettingSearch, divisor: int) -> StepTried | None:
 
 
 def answer_path(
-    folder: Path,
-    question: AnswerQuestion,
-    asked: AskedTolerance,
-    engines: Sequence[str] = (),
-    caps: SearchCaps = WHOLE,
+    folder: Path, question: AnswerQuestion, asked: AskedTolerance, engines: Sequence[str] = (), caps: SearchCaps = WHOLE
 ) -> Path:
     """File of an answer below the folder of results."""
     bounds = {name: [bound.value, bound.relative] for name, bound in asked.bounds.items()}

@@ -17,20 +17,26 @@ def asked(out: Path, engine: str, *more: str) -> list[str]:
     return [*given, *(more or ("--tolerance", "1 mm"))]
 
 
+@pytest.mark.own_workers
 @pytest.mark.drill
-def test_a_step_is_good_enough_or_is_not(proofroll: Proofroll, tmp_path: Path) -> None:
-    """Yes with the error of what is allowed and twice the step; no with the step that it needs at best."""
+def test_a_step_is_good_enough_or_is_not(proofroll: Proofroll, tmp_path: Path, started_workers: list[str]) -> None:
+    """Yes with the error of what is allowed and twice the step; no with the step that it needs at best.
+
+    The stored answer starts no process.
+    """
     engine = "mujoco[formulation=joints,preset=matched,dt={}]"
     code, out, _ = proofroll(*asked(tmp_path, engine.format(1e-3)))
     assert code == 0
     assert out.startswith("Yes: ")
     assert " of 1 mm over 0.5 s (dt 1e-3 s, " in out
+    assert sorted(started_workers) == ["mujoco", "truth"]
     code, text, _ = proofroll(*asked(tmp_path, engine.format(1e-3)), "--json")
     content = json.loads(text)
     assert content["holds"]
     assert content["sentence"].startswith("Yes: ")
     assert content["error"] <= 1e-3
     assert json.loads(proofroll(*asked(tmp_path, engine.format(1e-3)), "--json")[1]) == content, "it is stored"
+    assert len(started_workers) == 2
     code, out, _ = proofroll(*asked(tmp_path, engine.format(1e-3).replace("matched", "default"), "--tolerance", "1 nm"))
     assert code == 1
     assert out.startswith("No: ")

@@ -180,7 +180,7 @@ def test_reports_of_a_map(small: Any) -> None:
     assert headline(study).startswith("2 points, ")
     console = Console(width=100, record=True, file=open("/dev/null", "w"))  # noqa: SIM115 -- nobody reads it
     console.print(boundary_table(study))
-    assert "projection solver rotating frame, default" in console.export_text()
+    assert "projection solver rotating frame, as installed" in console.export_text()
     assert len(list(silent_lines(study))) <= 8
 
 

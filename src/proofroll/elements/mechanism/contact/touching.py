@@ -62,6 +62,8 @@ class Moving(NamedTuple):
 
     def plain_velocity(self, place: Floats3) -> Floats3:
         """:meth:`velocity` in plain floats or symbols."""
+        if self is AT_REST:
+            return 0.0, 0.0, 0.0
         return plus(self.v.tolist(), plain_cross(self.w.tolist(), minus(place, self.p.tolist())))
 
 
@@ -297,16 +299,17 @@ def _on_wall(shape: ConvexShape, body: Moving, wall: Wall, wall_body: Moving) ->
 
 def _on_curve(sphere: SphereShape, body: Moving, wall: CurvedWall, wall_body: Moving) -> _Lying:
     """Numbers of :func:`_on_wall` on a curved wall."""
-    axes = wall.axes if wall_body is AT_REST else (wall_body.R @ wall.frame).tolist()
-    spin, radius = wall_body.w.tolist(), sphere.radius
-    centre, velocity = _carried(body, sphere.centre)
-    beside = minus(centre, wall_body.p.tolist())
-    slides = minus(velocity, plus(wall_body.v.tolist(), plain_cross(spin, beside)))  # over the wall's body
-    foot = turned(wall_body.R.tolist(), wall.point.tolist())
-    distance, normal, (xx, xy, xz, yy, yz, zz) = wall.seen(*turned_back(axes, minus(beside, foot)))
-    bent = turned(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), turned_back(axes, slides))
+    radius, (centre, slides) = sphere.radius, _carried(body, sphere.centre)
+    axes, velocity, place = wall.axes, slides, minus(centre, wall.point.tolist())
+    if wall_body is not AT_REST:
+        axes, beside = (wall_body.R @ wall.frame).tolist(), minus(centre, wall_body.p.tolist())
+        place = minus(beside, turned(wall_body.R.tolist(), wall.point.tolist()))
+        slides = minus(velocity, wall_body.plain_velocity(centre))  # over the wall's body
+    distance, normal, (xx, xy, xz, yy, yz, zz) = wall.seen(*turned_back(axes, place))
     n = turned(axes, normal)
-    n_rate = plus(plain_cross(spin, n), turned(axes, bent))
+    n_rate = turned(axes, turned(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), turned_back(axes, slides)))
+    if wall_body is not AT_REST:
+        n_rate = plus(plain_cross(wall_body.w.tolist(), n), n_rate)
     return distance - radius, n, n_rate, minus(centre, scaled(radius, n)), minus(velocity, scaled(radius, n_rate))
 
 

@@ -3,8 +3,6 @@
 import itertools
 
 import numpy as np
-from scipy.spatial import ConvexHull
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.contact.start import TOUCHING, touches
@@ -13,7 +11,7 @@ from proofroll.elements.mechanism.report.ball_on_net import ball_on_net
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.checks import WORLD
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, SLIDING, JointKind
-from proofroll.elements.mechanism.scene.rotations import frame_of_axis, scaled
+from proofroll.elements.mechanism.scene.rotations import frame_of_axis, from_rotation_vector, scaled
 from proofroll.elements.mechanism.scene.shapes.shapes import HalfSpace, Shape, SphereShape, Wall
 from proofroll.elements.mechanism.scene.shapes.walls import BowlWall, CurvedWall
 from proofroll.report.pen import Drawing, View, across, circle, unit
@@ -169,6 +167,8 @@ def _hull(places: FloatArray) -> FloatArray:
     if sizes[-1] < 1.0:
         heights = places @ axes[0]
         return places[[heights.argmin(), heights.argmax()]]
+    from scipy.spatial import ConvexHull  # which few pictures need
+
     corners = ConvexHull(places).vertices
     return places[[*corners, corners[0]]]
 
@@ -202,7 +202,7 @@ def _laws(picture: Drawing, view: View, element: MechanismElement) -> None:
                 continue
             com = mechanism.bodies[mechanism.body_index[joint.child]].com
             arm = np.asarray(start.point(joint.child, com)[0]) - here
-            turned = Rotation.from_rotvec((limit - joint.q0[0]) * axis).apply(arm)
+            turned = from_rotation_vector((limit - joint.q0[0]) * axis) @ arm
             picture.path(view(np.stack([here, here + turned])), "faint")
 
 

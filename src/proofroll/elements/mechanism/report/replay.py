@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicHermiteSpline
-from scipy.spatial.transform import Rotation
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, hermite
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.dynamics.placed import Placed
@@ -19,6 +17,12 @@ from proofroll.elements.mechanism.run.contacts.observables import SLIDES
 from proofroll.elements.mechanism.run.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.scene.checks import WORLD, ZERO, Vector
 from proofroll.elements.mechanism.scene.joint_kinds import SLIDING, JointKind
+from proofroll.elements.mechanism.scene.rotations import (
+    quaternion_of_vector,
+    quaternion_product,
+    to_quaternion,
+    vector_of_quaternion,
+)
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact, DeclaredGeometry, Geometry
 from proofroll.elements.mechanism.scene.shapes.shapes import SphereShape, Wall
 from proofroll.files.json_data import plain
@@ -190,7 +194,7 @@ def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatA
         half = reach * np.array([math.cos(geometry.slope or 0.0)] * 2 + [math.sin(geometry.slope or 0.0)])
     if geometry.kind == "torus":
         half = np.full(3, geometry.ring_radius)
-    turn = Rotation.from_matrix(frame).as_quat()
+    turn = np.roll(to_quaternion(frame), -1)
     shape: dict[str, Any] = {
         "body": body,
         "kind": geometry.kind,
@@ -233,7 +237,7 @@ def _placed(element: MechanismElement, sampled: dict[str, npt.NDArray[Any]], tim
     if grid.size < 2:  # it ended before its first step
         return Placed(element.mechanism, times[:1], *(sampled[name][:1] for name in _MOTION[1:]))
     times = times[times <= grid[-1] * (1 + 1e-12)]
-    p_WB = np.asarray(CubicHermiteSpline(grid, sampled["p_WB"], sampled["v_WB"])(times))
+    p_WB = hermite(grid, sampled["p_WB"], sampled["v_WB"], times)
     v_WB, w_WB = (np.zeros_like(p_WB) for _ in range(2))  # not drawn
     q_WB = np.stack(
         [_orientations(grid, sampled["q_WB"][:, n], sampled["w_WB"][:, n], times) for n in range(p_WB.shape[1])], axis=1
@@ -243,8 +247,7 @@ def _placed(element: MechanismElement, sampled: dict[str, npt.NDArray[Any]], tim
 
 def _orientations(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -> FloatArray:
     """Orientations between samples, with the whole turns that the spin implies, shape (frames, 4)."""
-    stored = Rotation.from_quat(q, scalar_first=True)
-    turn = (stored[1:] * stored[:-1].inv()).as_rotvec()
+    turn = vector_of_quaternion(quaternion_product(q[1:], q[:-1] * [1, -1, -1, -1]))
     spun = (w[1:] + w[:-1]) / 2 * np.diff(grid)[:, None]
     angle = np.linalg.norm(turn, axis=1, keepdims=True)
     # Where the turn is a whole number of turns, its axis is that of the spin.
@@ -254,8 +257,7 @@ def _orientations(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatAr
     turn = turn + 2 * np.pi * whole * axis
     index = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
     part = (times - grid[index]) / np.diff(grid)[index]
-    turned = Rotation.from_rotvec(part[:, None] * turn[index]) * stored[index]
-    return np.asarray(turned.as_quat(scalar_first=True))
+    return quaternion_product(quaternion_of_vector(part[:, None] * turn[index]), q[index])
 
 
 def _reachable(motion: Placed, true: Placed, length: float) -> Placed:

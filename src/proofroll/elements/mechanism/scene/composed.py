@@ -232,9 +232,7 @@ class SprungJoint:
             raise InputError(f"joints.{self.name}.rest", self.rest, advice)
         frame = rotations.from_rpy(joint.orientation)
         place = np.array(joint.position) + frame @ rest[:3]
-        from scipy.spatial.transform import Rotation  # which few scenes need
-
-        at_rest = frame @ Rotation.from_rotvec(rest[3:]).as_matrix()
+        at_rest = frame @ rotations.from_rotation_vector(np.array(rest[3:]))
         spring = Bushing(
             f"{self.name}.spring", self.parent, self.child, position_a=tuple(place), position_b=joint.child_position,
             orientation_a=rotations.to_rpy(at_rest), **laws,

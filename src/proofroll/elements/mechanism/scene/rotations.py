@@ -104,6 +104,13 @@ def about(axis: int, angle: Any) -> Array:
     return R
 
 
+def from_rotation_vector(turn: Array) -> Array:
+    """Rotations about the axes of vectors by their lengths, rad, shape (…, 3); shape (…, 3, 3)."""
+    K, angle = skews(turn), np.linalg.norm(turn, axis=-1)[..., None, None]
+    R: Array = _UNIT + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * K @ K
+    return R
+
+
 def from_rpy(rpy: ArrayLike) -> Array:
     """Rotation of roll, pitch, yaw about fixed axes x, y, z, rad (URDF's convention)."""
     roll, pitch, yaw = np.asarray(rpy, dtype=float)
@@ -145,6 +152,26 @@ def to_quaternion(R: Array) -> Array:
     return np.where(q[..., :1] >= 0, q, -q)
 
 
+def quaternion_product(p: Array, q: Array) -> Array:
+    """Quaternions of turning first by ``q``, then by ``p``, shapes (…, 4)."""
+    w = p[..., :1] * q[..., :1] - (p[..., 1:] * q[..., 1:]).sum(axis=-1, keepdims=True)
+    v = p[..., :1] * q[..., 1:] + q[..., :1] * p[..., 1:] + np.cross(p[..., 1:], q[..., 1:])
+    return np.concatenate([w, v], axis=-1)
+
+
+def quaternion_of_vector(turn: Array) -> Array:
+    """Unit quaternions of rotation vectors, rad, shape (…, 3); shape (…, 4)."""
+    half = np.linalg.norm(turn, axis=-1, keepdims=True) / 2
+    return np.concatenate([np.cos(half), np.sinc(half / np.pi) * turn / 2], axis=-1)
+
+
+def vector_of_quaternion(q: Array) -> Array:
+    """Rotation vectors of at most half a turn, rad, of unit quaternions, shape (…, 4); shape (…, 3)."""
+    q = np.where(q[..., :1] < 0, -q, q)
+    half = np.arctan2(np.linalg.norm(q[..., 1:], axis=-1, keepdims=True), q[..., :1])
+    return np.asarray(2 * q[..., 1:] / np.sinc(half / np.pi))
+
+
 def quaternion_from_z(axis: Sequence[float]) -> tuple[float, float, float, float]:
     """A unit quaternion ``(w, x, y, z)`` that turns z to a unit vector; the turn about that does not matter."""
     x, y, z = axis
@@ -164,9 +191,10 @@ def quaternion_rate(q: Any, w: Any) -> Array:
 
 def carried(vector: Array, start: Array, end: Array) -> Array:
     """A vector turned by the smallest rotation that takes a unit vector to another one less than a half turn away."""
-    axis = cross(start, end)
-    across = cross(axis, vector)
-    return np.asarray(vector + across + cross(axis, across) / (1.0 + start @ end))
+    axis = plain_cross(start.tolist(), end.tolist())
+    across = plain_cross(axis, vector.tolist())
+    back = scaled(1.0 / (1.0 + dot(start, end)), plain_cross(axis, across))
+    return np.array(plus(plus(vector.tolist(), across), back))
 
 
 def frame_of_axis(z: ArrayLike, x: ArrayLike | None = None) -> Array:

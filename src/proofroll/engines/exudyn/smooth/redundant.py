@@ -14,20 +14,8 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.dynamics.held_signals import drive
 from proofroll.elements.mechanism.dynamics.loop_points import normal_of_plane
-from proofroll.elements.mechanism.run.capabilities import (
-    ALL_JOINTS,
-    ALL_LOOPS,
-    FORCES,
-    MechanismCapability,
-    require,
-)
-from proofroll.elements.mechanism.run.sampling import (
-    MechanismBuilt,
-    MechanismSample,
-    mechanism_of,
-    row_rank,
-    unsaid,
-)
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of, row_rank, unsaid
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_AXIS, JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, quaternion_rate, to_quaternion
 from proofroll.elements.mechanism.scene.signal import varies

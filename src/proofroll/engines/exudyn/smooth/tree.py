@@ -12,13 +12,7 @@ import numpy as np
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD, Joint
 from proofroll.elements.mechanism.dynamics.held_signals import drive
-from proofroll.elements.mechanism.run.capabilities import (
-    ALL_JOINTS,
-    ALL_LOOPS,
-    FORCES,
-    MechanismCapability,
-    require,
-)
+from proofroll.elements.mechanism.run.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.run.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, to_quaternion

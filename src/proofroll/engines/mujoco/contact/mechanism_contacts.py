@@ -180,6 +180,11 @@ def _moving(mechanism: Mechanism) -> frozenset[str]:
     return frozenset({body.name for body in mechanism.bodies} - fixed_bodies)
 
 
+def _in_equations(data: Any) -> list[tuple[Any, int]]:
+    """MuJoCo's contacts that have rows in its equations, each with its first one."""
+    return [(data.contact[index], row) for index, row in enumerate(data.contact.efc_address.tolist()) if row >= 0]
+
+
 class ContactsRead(NamedTuple):
     """Contacts as MuJoCo finds them.
 
@@ -250,11 +255,7 @@ class Contacts:
             rows: Jacobian of all rows, shape (nefc, nv).
         """
         dt, rates = self._model.opt.timestep, rows @ data.qacc
-        for index in range(data.ncon):
-            contact = data.contact[index]
-            row = int(contact.efc_address)
-            if row < 0:
-                continue
+        for contact, row in _in_equations(data):
             number = self._number(contact)
             turns = [rows[row] - previous for previous in self._normal_rows.get(number, ())]
             if turns:  # a pair that meets in several points: the nearest row
@@ -284,13 +285,10 @@ class Contacts:
         depth adds by K I times itself and the margin.
         """
         depths = dict[int, float]()
-        for index in range(data.ncon):
-            contact = data.contact[index]
-            row = int(contact.efc_address)
-            if row >= 0:
-                K, _, impedance, _ = data.efc_KBIP[row].tolist()
-                loaded = float(data.efc_R[row] * data.efc_force[row]) / (K * impedance)
-                depths[self._number(contact)] = loaded - margin(self._settings)
+        for contact, row in _in_equations(data):
+            K, _, impedance, _ = data.efc_KBIP[row].tolist()
+            loaded = float(data.efc_R[row] * data.efc_force[row]) / (K * impedance)
+            depths[self._number(contact)] = loaded - margin(self._settings)
         return depths
 
     def _slipping(self, contact: Any) -> tuple[Array, slice]:
@@ -307,24 +305,20 @@ class Contacts:
         Friction of what sticks misses nothing and lifts nothing; rates of the evaluation before would only seem to.
         """
         self._on_cone, within = set[int](), set[int]()
-        for index in range(data.ncon):
-            contact = data.contact[index]
-            row = int(contact.efc_address)
-            if row >= 0:
-                mu, friction = self._slipping(contact)
-                bound = _NEAR_CONE * data.efc_force[row]
-                if bound > 0 and mu.size:
-                    on_cone = math.hypot(*(data.efc_force[friction] / mu).tolist()) >= bound
-                    (self._on_cone if on_cone else within).add(self._number(contact))
+        for contact, row in _in_equations(data):
+            mu, friction = self._slipping(contact)
+            bound = _NEAR_CONE * data.efc_force[row]
+            if bound > 0 and mu.size:
+                on_cone = math.hypot(*(data.efc_force[friction] / mu).tolist()) >= bound
+                (self._on_cone if on_cone else within).add(self._number(contact))
         self._sticking = within - self._on_cone - self._turned
 
     def remember(self, data: Any, rows: Array) -> None:
         """Keeps normal rows of a step, and accelerations of that before, for the next one; arguments of correct."""
         self._normal_rows, self._rates = {}, data.qacc.copy()
-        for index in range(data.ncon):
-            contact = data.contact[index]
-            if contact.efc_address >= 0 and self._number(contact) not in self._turned:
-                self._normal_rows.setdefault(self._number(contact), []).append(rows[int(contact.efc_address)])
+        for contact, row in _in_equations(data):
+            if self._number(contact) not in self._turned:
+                self._normal_rows.setdefault(self._number(contact), []).append(rows[row])
 
     def _number(self, contact: Any) -> int:
         """Number of the mechanism's contact to which MuJoCo's contact belongs."""
@@ -352,19 +346,16 @@ class Contacts:
 
     def add_turning(self, data: Any) -> None:
         """Adds J̇v, which MuJoCo leaves out of the rows of contacts, to the reference accelerations of ``data``."""
-        for index in range(data.ncon):
-            contact = data.contact[index]
-            if contact.efc_address >= 0:
-                row, dim = int(contact.efc_address), min(SLIDES, int(contact.dim))
-                data.efc_aref[row : row + dim] -= self._turning(data, contact)[:dim]
+        for contact, row in _in_equations(data):
+            dim = min(SLIDES, int(contact.dim))
+            data.efc_aref[row : row + dim] -= self._turning(data, contact)[:dim]
 
     def add_curvature(self, data: Any) -> None:
         """Adds J̇v to the rows of curved walls, but for what MuJoCo's damping of velocities that lag supplies.
 
         To be called like :meth:`correct`. See :attr:`.MujocoSettings.velocity_lag` and those after it.
         """
-        contacts = [data.contact[index] for index in range(data.ncon)]
-        contacts = [item for item in contacts if item.efc_address >= 0 and self._number(item) in self._turned]
+        contacts = [item for item in _in_equations(data) if self._number(item[0]) in self._turned]
         if not contacts:
             return
         (lag, ahead, share), lagging, turnings = self._lags, data.qvel.copy(), []
@@ -373,11 +364,11 @@ class Contacts:
         for time in (lag, ahead):
             data.qvel[:] = lagging + time * rates
             mujoco.mj_comVel(self._model, data)
-            turnings.append([self._turning(data, contact) for contact in contacts])
+            turnings.append([self._turning(data, contact) for contact, _ in contacts])
         data.qvel[:] = lagging
         mujoco.mj_comVel(self._model, data)
-        for contact, turning, later in zip(contacts, *turnings, strict=True):
-            row, dim = int(contact.efc_address), min(SLIDES, int(contact.dim))
+        for (contact, row), turning, later in zip(contacts, *turnings, strict=True):
+            dim = min(SLIDES, int(contact.dim))
             turning[0] = later[0]
             data.efc_aref[row : row + dim] -= (1 - share) * turning[:dim]
 
@@ -414,11 +405,7 @@ class Contacts:
             rates: accelerations of all rows, J q̈, shape (nefc,).
         """
         missed = rates - data.efc_aref
-        for index in range(data.ncon):
-            contact = data.contact[index]
-            row = int(contact.efc_address)
-            if row < 0:
-                continue
+        for contact, row in _in_equations(data):
             mu, friction = self._slipping(contact)
             if np.linalg.norm(data.efc_force[friction] / mu) >= _NEAR_CONE * data.efc_force[row]:
                 data.efc_aref[row] -= np.linalg.norm(mu * missed[friction])

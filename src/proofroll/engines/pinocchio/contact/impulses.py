@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.touching import ONE_POINT, Touching, touch
 from proofroll.elements.mechanism.run.contacts import step_events
 from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, STICK
-from proofroll.elements.mechanism.scene.rotations import Array, carried, frame_of_axis
+from proofroll.elements.mechanism.scene.rotations import Array, carried, dot, frame_of_axis
 from proofroll.engines.pinocchio.contact.blocks import Block, BlockSolver
 from proofroll.engines.pinocchio.contact.joint_rows import JointRows
 from proofroll.engines.pinocchio.contact.shared_cones import SharedCones
@@ -100,7 +100,8 @@ class ImpulseSteps:
         ends = list(accumulate([*(3 + turns for turns in sharing.turns), *[1] * len(self.joints.J)], initial=0))
         self._rows = list(starmap(range, pairwise(ends)))  # numbers of the rows of each contact and joint row
         self._slides = [row for rows in self._rows[: len(self.contacts)] for row in rows[-3:]]
-        self._upper = np.triu(np.ones((nv, nv), dtype=bool))
+        numbers = np.arange(nv)
+        self._upper = np.minimum.outer(numbers, numbers) * nv + np.maximum.outer(numbers, numbers)
         # Impulses that impose motions without contacts, and velocities by a unit rate of each.
         self._motions: tuple[Array, Array] = np.zeros(0), np.zeros((tree.model.nv, 0))
         try:
@@ -197,8 +198,7 @@ class ImpulseSteps:
         tau = tree.drives(q, v)
         rate = pin.aba(model, data, q, v, tau, pulls) if pulls else pin.aba(model, data, q, v, tau)
         free = v + span * rate
-        upper = pin.computeMinverse(model, data, q)
-        inverse = np.where(self._upper, upper, upper.T)
+        inverse = pin.computeMinverse(model, data, q).take(self._upper)  # of which it gives the upper half alone
         if len(tree.geared):
             free, inverse = self._driven(q, free, inverse, span, late)
         pin.computeJointJacobians(model, data, q)
@@ -210,7 +210,18 @@ class ImpulseSteps:
             ]
         rows = np.concatenate([*contact_rows, self.joints.J])
         J = rows[self._slides if self.sharing else slice(len(self._slides))].reshape(-1, 3, model.nv)
-        return StepTerms(rows=rows, J=J, free=free, inverse=inverse, touching=touching, frames=frames)
+        into = inverse @ rows.T
+        return StepTerms(
+            rows=rows,
+            J=J,
+            free=free,
+            at_free=rows @ free,
+            inverse=inverse,
+            into=into,
+            response=rows @ into,
+            touching=touching,
+            frames=frames,
+        )
 
     def _driven(self, q: Array, free: Array, inverse: Array, span: float, late: float) -> tuple[Array, Array]:
         """Velocity without impulses and inverse mass matrix where motions are imposed, whose impulses hold in a step.
@@ -335,33 +346,31 @@ class ImpulseSteps:
         """
         if not self._moments.frictions:
             return self._solved(terms, shifts, span, convex=convex)
-        J, free, inverse, touching = terms.J, terms.free, terms.inverse, terms.touching
-        rows = self._moments.rows(self._data, terms.touching, terms.frames, J)
-        approach, soft_speed = J[:, 2] @ v, -_SOFT * self._gravity * span
-        soft = approach >= soft_speed
-        if not soft.all():  # a curved wall turns away from a fast ball
-            bends = np.array([abs(change) for _, _, change in self._turning(q, v, terms, span)])
-            soft = approach >= soft_speed - _SOFT * bends
-        kicks = list[Impulses]()
+        J, touching = terms.J, terms.touching
+        rows = self._moments.rows(self._data, touching, terms.frames, J)
+        approach, soft_speed = (J[:, 2] @ v).tolist(), -_SOFT * self._gravity * span
+        soft = [speed >= soft_speed for speed in approach]
+        if not all(soft):  # a curved wall turns away from a fast ball
+            turning = self._turning(q, v, terms, span)
+            soft = [a >= soft_speed - _SOFT * abs(bend) for a, (_, _, bend) in zip(approach, turning, strict=True)]
 
         def pressed(impulses: Array) -> Pressed:
-            kick = self._solved(terms._replace(free=free + inverse @ impulses), shifts, span, convex=convex)
-            kicks[:] = [kick]
-            sizes = np.array([touch.normal @ push for touch, push in zip(touching, kick.impulse, strict=True)])
-            sticking_rows = [np.zeros((0, len(v)))]
-            for k in np.flatnonzero(sizes > 0).tolist():
-                sticking_rows.append(J[k, 2:] if kick.states[k] == SLIP else J[k])
-            return Pressed(kick.v, (sizes * soft)[self._pressed_by], np.concatenate(sticking_rows), kick.states)
+            moved = terms
+            if impulses.any():
+                free, at_free = terms.free + terms.inverse @ impulses, terms.at_free + impulses @ terms.into
+                moved = terms._replace(free=free, at_free=at_free)
+            kick = self._solved(moved, shifts, span, convex=convex)
+            return kick, [dot(touching[k].normal, kick.impulse[k]) if soft[k] else 0.0 for k in self._pressed_by]
 
-        moments, impulses = self._moments.found(rows, v, inverse, pressed, self.t)
-        by_contact = kicks[0].moment.copy()
-        np.add.at(by_contact, self._pressed_by, moments)
-        driving = kicks[0].driving - self._motions[1].T @ impulses
-        return kicks[0]._replace(moment=by_contact, driving=driving)
+        kick, moments, impulses = self._moments.found(rows, J, v, terms.inverse, pressed, self.t)
+        by_contact = kick.moment.copy()
+        for k, moment in zip(self._pressed_by, moments, strict=True):
+            by_contact[k] += moment
+        return kick._replace(moment=by_contact, driving=kick.driving - self._motions[1].T @ impulses)
 
     def _solved(self, terms: StepTerms, shifts: Sequence[float], span: float, *, convex: bool) -> Impulses:
         """Impulses of dry friction and of all contacts and stops that would close, also due to other impulses."""
-        rows, free, frames = terms.rows, terms.free, terms.frames
+        free, at_free, frames = terms.free, terms.at_free, terms.frames
         count, v, own_rows, added = len(frames), free, self._rows, np.array(shifts)
         rubs = count + len(self.joints.friction)
         gaps = [k for k in (*self._all, *range(rubs, len(own_rows))) if math.isfinite(shifts[own_rows[k][-1]])]
@@ -370,12 +379,11 @@ class ImpulseSteps:
         states = [OPEN] * count
         grown, pushed = bool(which), np.zeros(len(free))
         alone, motor_responses = self._motions
-        at_free = rows @ free
         speeds = at_free.tolist()
         while True:
             closing = set[int]()
             for k in gaps:
-                of_row = [speeds[row] for row in own_rows[k]]
+                of_row = speeds[own_rows[k].start : own_rows[k].stop]
                 # a speed that is round-off of its rows would be the unit of impulses, in which slips are huge
                 if of_row[-1] + shifts[own_rows[k][-1]] < -_SMALL * max(map(abs, of_row)):
                     closing.add(k)
@@ -389,11 +397,10 @@ class ImpulseSteps:
                 return Impulses(v=v, impulse=impulse, states=seen, moment=moment, along=along_rows, driving=driving)
             which, grown = tuple(sorted(closing.union(which))), False
             parts = self._solver(which)
-            chosen, g = rows[parts.rows], (at_free + added)[parts.rows]
-            to_joints = terms.inverse @ chosen.T
-            got = self._by_any(which, chosen @ to_joints, g, terms, span, convex=convex)
-            v, pushed = free + to_joints @ got, chosen.T @ got if alone.size else pushed
-            speeds, sizes = (rows @ v).tolist(), got.tolist()
+            response, g = terms.response[:, parts.rows], (at_free + added)[parts.rows]
+            got = self._by_any(which, response[parts.rows], g, terms, span, convex=convex)
+            v, pushed = free + terms.into[:, parts.rows] @ got, terms.rows[parts.rows].T @ got if alone.size else pushed
+            speeds, sizes = (at_free + response @ got).tolist(), got.tolist()
             impulse[:], moment[:], along_rows[:] = 0.0, 0.0, 0.0
             for end, k in zip(parts.ends, which, strict=True):
                 if k < count:
@@ -480,8 +487,9 @@ class ImpulseSteps:
             impulses = result.retrieveConstraintImpulses()
             sizes, narrow = impulses.tolist(), []
             for point, end, mu in points:
-                bound = point.getFriction() * sizes[end - 1]
-                if point.getFriction() < mu and math.hypot(*sizes[end - 3 : end - 1]) + least >= bound > least:
+                friction = point.getFriction()
+                bound = friction * sizes[end - 1]
+                if friction < mu and math.hypot(*sizes[end - 3 : end - 1]) + least >= bound > least:
                     narrow.append((point, mu))
             if not narrow:
                 return np.asarray(unit * impulses)

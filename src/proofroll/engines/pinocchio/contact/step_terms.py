@@ -43,8 +43,9 @@ class StepTerms(NamedTuple):
     Attributes:
         rows: of contacts and joints, (rows, nv).
         J: contact rows, (contacts, 3, nv): slip velocities along the normal's :func:`frame_of_axis`, the normal last.
-        free: velocity after the step without impulses, (nv,).
+        free, at_free: velocity after the step without impulses, (nv,), and of the rows, (rows,).
         inverse: of the mass matrix, (nv, nv).
+        into, response: velocities by a unit impulse along each row, (nv, rows), and of the rows, (rows, rows).
         touching: geometry of the contacts.
         frames: of their normals.
     """
@@ -52,7 +53,10 @@ class StepTerms(NamedTuple):
     rows: Array
     J: Array
     free: Array
+    at_free: Array
     inverse: Array
+    into: Array
+    response: Array
     touching: list[Touching]
     frames: list[Array]
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from operator import sub
 
 import numpy as np
 import pinocchio as pin
@@ -10,29 +10,19 @@ import pinocchio as pin
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.contact.rolling_and_spin import largest_response, turning_frictions
 from proofroll.elements.mechanism.contact.touching import Touching
-from proofroll.elements.mechanism.run.contacts.step_events import SLIP, States
-from proofroll.elements.mechanism.scene.rotations import Array, skew
+from proofroll.elements.mechanism.run.contacts.step_events import OPEN, SLIP, States
+from proofroll.elements.mechanism.scene.rotations import Array, minus, plus, scaled, skew
+from proofroll.engines.pinocchio.contact.step_terms import Impulses
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
 # Most solutions of a step, and change of moments that counts as none, in the solver's tolerances of the largest one:
 # what the iteration leaves is not seen beside what the solver leaves.
 _MOST, _SETTLED = 100, 1e-2
+# Cross product of a normal with a vector, in the frame whose last axis it is.
+_ACROSS = skew((0.0, 0.0, 1.0))
 
 
-class Pressed(NamedTuple):
-    """Outcome of the contacts of a step for given moments.
-
-    Attributes:
-        v: velocities after it, (nv,).
-        normal: impulse along the normal of each contact whose friction against turning acts [N s].
-        held: rows that its contacts hold at zero, (rows, nv).
-        states: of all contacts.
-    """
-
-    v: Array
-    normal: Array
-    held: Array
-    states: States
+Pressed = tuple[Impulses, list[float]]  # impulses of the contacts, and normal one of each friction that acts [N s]
 
 
 class TurningImpulses:
@@ -63,42 +53,56 @@ class TurningImpulses:
             rows[0, k] = friction.resisted(normal, rows[0, k])
             rows[1, k] = rows[0, k]
             if friction.bend:
-                rows[1, k] += friction.bend * skew(normal) @ frames[friction.pressed_by] @ J[friction.pressed_by]
+                rows[1, k] += friction.bend * frames[friction.pressed_by] @ _ACROSS @ J[friction.pressed_by]
         return rows
 
     def found(
-        self, rows: Array, v: Array, inverse: Array, pressed: Callable[[Array], Pressed], time: float
-    ) -> tuple[Array, Array]:
-        """Impulsive moments of all frictions [N m s], (frictions, 3), and the joint impulses that they are, (nv,).
+        self, rows: Array, J: Array, v: Array, inverse: Array, pressed: Callable[[Array], Pressed], time: float
+    ) -> tuple[Impulses, Array, Array]:
+        """Impulses beside those of all frictions [N m s], (frictions, 3), and the joint impulses that these are, (nv,).
 
         Args:
             rows: see :meth:`rows`.
+            J: see :meth:`rows`.
             v: joint velocities before the step.
             inverse: of the mass matrix.
-            pressed: contacts for joint impulses of the moments.
+            pressed: gives the contacts for joint impulses of the moments.
             time: for messages [s].
 
         Raises:
             Diverged: the iterations do not settle.
         """
-        moments, impulses = np.zeros((len(self.frictions), 3)), np.zeros(len(v))
-        coefficients = np.array([friction.friction for friction in self.frictions])
-        eases = dict[tuple[int, bytes], float]()  # what is held is mostly the same in all solutions of a step
+        both, count = rows.reshape(-1, len(v)), 3 * len(self.frictions)
+        turning_rows, before = both[:count], (both[count:] @ v).tolist()
+        frees = ((turning_rows @ inverse) * turning_rows).sum(axis=1).reshape(-1, 3).sum(axis=1).tolist()
+        moments, impulses = [0.0] * count, np.zeros(len(v))
+        eases = dict[tuple[int, States], float]()  # what is held is mostly the same in all solutions of a step
         for _ in range(_MOST):
-            outcome, last = pressed(impulses), moments.copy()
-            bounds, held = coefficients * outcome.normal, outcome.held.tobytes()
-            for k, (row, opposed, bound) in enumerate(zip(*rows, bounds.tolist(), strict=True)):
-                if (k, held) not in eases:
-                    ways = inverse @ row.T
-                    of_held = outcome.held @ inverse @ outcome.held.T
-                    eases[k, held] = largest_response(row @ ways, outcome.held @ ways, of_held)
-                if eases[k, held]:
-                    moments[k] -= row @ outcome.v / eases[k, held]
-                moves = self.frictions[k].bend and outcome.states[self.frictions[k].pressed_by] == SLIP
-                if moves or math.hypot(*moments[k].tolist()) > bound:
-                    turning = opposed @ (v + outcome.v)
-                    moments[k] = -bound * turning / (math.hypot(*turning.tolist()) or 1.0)
-            impulses = moments.ravel() @ rows[0].reshape(moments.size, -1)
-            if np.abs(moments - last).max() <= _SETTLED * self._tolerance * bounds.max():
-                return moments, impulses
+            (outcome, normal), last, moments = pressed(impulses), moments, [*moments]
+            rates = (both @ outcome.v).tolist()
+            bounds = [friction.friction * size for friction, size in zip(self.frictions, normal, strict=True)]
+            for k, (friction, bound) in enumerate(zip(self.frictions, bounds, strict=True)):
+                own, held = slice(3 * k, 3 * k + 3), (k, outcome.states)
+                moves = bool(friction.bend) and outcome.states[friction.pressed_by] == SLIP
+                # what turns faster is not stopped within the bound: contacts only lessen its response
+                moves = moves or math.hypot(*rates[own]) > frees[k] * (bound + math.hypot(*last[own]))
+                if not moves:
+                    if held not in eases:
+                        eases[held] = _ease(rows[0, k], J, inverse, outcome.states)
+                    if eases[held]:
+                        moments[own] = minus(last[own], scaled(1.0 / eases[held], rates[own]))
+                    moves = math.hypot(*moments[own]) > bound
+                if moves:
+                    direction = plus(before[own], rates[count:][own])
+                    moments[own] = scaled(-bound / (math.hypot(*direction) or 1.0), direction)
+            impulses = np.array(moments) @ turning_rows
+            if max(map(abs, map(sub, moments, last))) <= _SETTLED * self._tolerance * max(bounds):
+                return outcome, np.array(moments).reshape(-1, 3), impulses
         raise Diverged(f"the moments of friction against turning at {time:g} s are not found in {_MOST} iterations")
+
+
+def _ease(row: Array, J: Array, inverse: Array, states: States) -> float:
+    """Largest response of a turning, (3, nv), while contacts hold what their states say; see :meth:`.found`."""
+    held = [J[k, 2:] if state == SLIP else J[k] for k, state in enumerate(states) if state != OPEN]
+    held_rows, ways = np.concatenate([J[:0, 0], *held]), inverse @ row.T
+    return largest_response(row @ ways, held_rows @ ways, held_rows @ inverse @ held_rows.T)

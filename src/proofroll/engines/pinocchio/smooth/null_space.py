@@ -70,18 +70,22 @@ class LoopRows:
         self._lengths = np.array([tree.mechanism.loops[number].length for number in self._point[self._struts]])
         self._loop = np.concatenate([self._point, self._angle])
         self._ends = np.array(tree.loops, dtype=np.intp).reshape(-1, 2).T
-        data, rest = self._model.createData(), np.zeros(self._model.nv)
+        self._carried = [bool(frame.parentJoint) for frame in self._model.frames]
+        data = self._model.createData()
 
         def at_rest(q: Array) -> tuple[Array, Array]:
-            rows = self.at(data, q, rest)
+            rows = self.at(data, q, None)
             return rows.residual, rows.C
 
         self.rank = 0
         if tree.closed:
             self.rank = independent_anywhere(tree.q0, at_rest, partial(pin.integrate, self._model))
 
-    def at(self, data: Any, q: Array, v: Array) -> RowsAtState:
-        """Rows at a state; leaves positions, velocities and drifts of all frames in ``data``."""
+    def at(self, data: Any, q: Array, v: Array | None) -> RowsAtState:
+        """Rows at a state; leaves positions, velocities and drifts of all frames in ``data``.
+
+        Without velocities the drifts are those at rest, and ``data`` has positions alone.
+        """
         if not len(self._tree.geared):
             return self._of_loops(data, q, v)
         rows, (residual, rate, drift) = self._of_loops(data, q, v), self._tree.apart(q)
@@ -92,59 +96,77 @@ class LoopRows:
             rate=np.concatenate([np.zeros(len(rows.residual)), rate]),
         )
 
-    def _of_loops(self, data: Any, q: Array, v: Array) -> RowsAtState:
+    def _of_loops(self, data: Any, q: Array, v: Array | None) -> RowsAtState:
         model = self._model
-        pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
+        if v is not None:
+            pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
-        (p_a, A, J_a, v_a, a_a), (p_b, B, J_b, v_b, a_b) = (self._frames(data, ends) for ends in self._ends)
-        J, a, d, w_a, w_b = J_b - J_a, a_b - a_a, p_b - p_a, v_a[:, 3:], v_b[:, 3:]
-        i, j, turning = self._point, self._angle, self._turning
-        n = np.where(turning, A[i, :, self._axis], self._fixed)
-        along_struts, strut = d[i[self._struts]], self._struts
-        sizes = np.sqrt((along_struts * along_struts).sum(1))
-        n[strut] = along_struts / sizes[:, None]
-        x, y, count, then = A[j, :, self._x], B[j, :, self._y], len(n), len(n) + len(self._angle)
-        # ω × each direction, and again; the moments d × n and y × x. One call for all takes as long as one for each.
-        spins = np.concatenate([w_a[i], w_a[j], w_b[j]])
-        rates = cross(spins, np.concatenate([n, x, y]))
-        bends = cross(spins, rates)
-        moments = cross(np.concatenate([d[i], y]), np.concatenate([n, x]))
-        r, t = turning * moments[:count], moments[count:]
-        C = _times(n, J[i, :3]) - _times(r, J_a[i, 3:])
-        drift_along = 2 * rates[:count] * (v_b - v_a)[i, :3] + bends[:count] * d[i]
-        drift = n * a[i, :3] - r * a_a[i, 3:] + turning * drift_along
-        x_rate, y_rate = rates[count:then], rates[then:]
-        turn = t * a[j, 3:] + bends[count:then] * y + x * bends[then:] + 2 * x_rate * y_rate
-        residual, drifts = np.concatenate([n * d[i], x * y]).sum(1), np.concatenate([drift, turn]).sum(1)
-        if len(strut):
-            slide = (v_b - v_a)[i[strut], :3]
+        (p_a, A, J_a), (p_b, B, J_b) = (self._frames(data, ends) for ends in self._ends)
+        J, d, i, j, strut = J_b - J_a, p_b - p_a, self._point, self._angle, self._struts
+        x, y = A[j, :, self._x], B[j, :, self._y]
+        t = cross(y, x)
+        # products with the world's axes are components
+        n, r, C, residual = self._fixed, None, J[i, self._axis], d[i, self._axis]
+        sizes = np.zeros(0)
+        if self._turning.any() or len(strut):
+            n = np.where(self._turning, A[i, :, self._axis], n)
+            sizes = np.sqrt((d[i[strut]] ** 2).sum(1))
+            n[strut] = d[i[strut]] / sizes[:, None]
+            r = self._turning * cross(d[i], n)
+            C, residual = _times(n, J[i, :3]) - _times(r, J_a[i, 3:]), (n * d[i]).sum(1)
             residual[strut] -= self._lengths
-            drifts[strut] += ((slide * slide).sum(1) - (n[strut] * slide).sum(1) ** 2) / sizes
         return RowsAtState(
-            residual=residual,
+            residual=np.concatenate([residual, (x * y).sum(1)]),
             C=np.concatenate([C, _times(t, J[j, 3:])]),
-            drift=drifts,
+            drift=np.zeros(len(self._loop)) if v is None else self._drifts(data, n, r, d, (x, y, t), sizes),
             rate=0.0,
             loop=self._loop,
             force=np.concatenate([n, np.zeros_like(t)]),
             torque=np.concatenate([np.zeros_like(n), t]),
         )
 
-    def _frames(self, data: Any, frames: NDArray[np.intp]) -> tuple[Array, Array, Array, Array, Array]:
-        """Positions, axes, Jacobians, velocities, accelerations at v̇ = 0 of frames, world axes; zero for the world."""
+    def _drifts(
+        self, data: Any, n: Array, r: Array | None, d: Array, angular: tuple[Array, Array, Array], sizes: Array
+    ) -> Array:
+        """Drifts of rows with directions ``n``; ``r``: moments of these about body_a's points; None: they are fixed."""
+        (v_a, a_a), (v_b, a_b) = (self._motions(data, ends) for ends in self._ends)
+        i, j, (x, y, t), a, strut = self._point, self._angle, angular, a_b - a_a, self._struts
+        # ω × each direction, and again
+        spins, both = np.concatenate([v_a[j, 3:], v_b[j, 3:]]), np.concatenate([x, y])
+        rates = cross(spins, both)
+        bends, count = cross(spins, rates), len(x)
+        turn = t * a[j, 3:] + bends[:count] * y + x * bends[count:] + 2 * rates[:count] * rates[count:]
+        drift = a[i, self._axis]
+        if r is not None:
+            slide, w_a = (v_b - v_a)[i, :3], v_a[i, 3:]
+            rates = cross(w_a, n)
+            drift_along = 2 * rates * slide + cross(w_a, rates) * d[i]
+            drift = (n * a[i, :3] - r * a_a[i, 3:] + self._turning * drift_along).sum(1)
+            slide = slide[strut]
+            drift[strut] += ((slide * slide).sum(1) - (n[strut] * slide).sum(1) ** 2) / sizes
+        return np.concatenate([drift, turn.sum(1)])
+
+    def _frames(self, data: Any, frames: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+        """Positions, axes and Jacobians of frames, world axes; no Jacobian for the world."""
         model, count = self._model, len(frames)
         p, R, J = np.empty((count, 3)), np.empty((count, 3, 3)), np.zeros((count, 6, model.nv))
-        v, a = np.zeros((count, 6)), np.zeros((count, 6))
         for number, frame in enumerate(frames.tolist()):
             pose = data.oMf[frame]
             p[number], R[number] = pose.translation, pose.rotation
-            if model.frames[frame].parentJoint:
+            if self._carried[frame]:
                 jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
                 J[number] = jacobian.reshape(6, model.nv)  # a single column is returned as a vector
+        return p, R, J
+
+    def _motions(self, data: Any, frames: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Velocities and accelerations at v̇ = 0 of frames, world axes; zero for the world."""
+        model, (v, a) = self._model, np.zeros((2, len(frames), 6))
+        for number, frame in enumerate(frames.tolist()):
+            if self._carried[frame]:
                 v[number] = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
                 a[number] = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
-        return p, R, J, v, a
+        return v, a
 
     def split(self, M: Array, C: Array) -> Split:
         """Splitting of velocities by the rows, in the metric of the mass matrix (upper triangle).
@@ -170,7 +192,7 @@ class LoopRows:
 
     def eliminated(self, data: Any, q: Array, v: Array) -> tuple[Array, Array]:
         """State without violations of the loops, moved along the locked directions (Blajer 2002)."""
-        rows = self.at(data, q, v)
+        rows = self.at(data, q, None)
         split = self.split(pin.crba(self._model, data, q), rows.C)
         v = v - split.locked @ (split.back @ (rows.C @ v - rows.rate))
         return pin.integrate(self._model, q, -split.locked @ (split.back @ rows.residual)), v

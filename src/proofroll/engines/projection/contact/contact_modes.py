@@ -18,11 +18,7 @@ from proofroll.core.events import EventKind
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.coulomb import contact_forces
-from proofroll.elements.mechanism.contact.joint_laws import (
-    JointContact,
-    line_response,
-    refuse_rubbing_stops,
-)
+from proofroll.elements.mechanism.contact.joint_laws import JointContact, line_response, refuse_rubbing_stops
 from proofroll.elements.mechanism.contact.modes import (
     FAINT,
     OPEN,

@@ -27,7 +27,7 @@ from proofroll.elements.mechanism.dynamics.switches import REDUNDANT
 from proofroll.elements.mechanism.run.sampling import DEPENDENT, independent_anywhere
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.prescribed import moved
-from proofroll.elements.mechanism.scene.rotations import Array, to_quaternion
+from proofroll.elements.mechanism.scene.rotations import Array, quaternion_rate, to_quaternion
 from proofroll.engines.projection.smooth.applied import Applied
 from proofroll.engines.projection.smooth.connections import SKEW, Bodies, ConnectionRows, ProjectedConnections
 from proofroll.engines.projection.smooth.elimination import Closing, Elimination, Loads, RowSplit, Space
@@ -382,15 +382,9 @@ def _rotation(p: Array, q: Array) -> Array:
     return np.array([*rows[0], *rows[1], *rows[2], a * w + b * x + c * y + d * z]).T
 
 
-def _rate(q: Array, w: Array) -> Array:
-    """Half the products of quaternions and angular velocities in the bodies' own axes; bilinear."""
-    (a, b, c, d), (x, y, z) = q.T, 0.5 * w.T
-    return np.array((-b * x - c * y - d * z, a * x + c * z - d * y, a * y + d * x - b * z, a * z + b * y - c * x)).T
-
-
 # Both for all pairs of units: with the products of all pairs of elements this takes three calls of numpy, not thirty.
 _ROTATION = _rotation(np.repeat(np.eye(4), 4, axis=0), np.tile(np.eye(4), (4, 1)))
-_RATE = _rate(np.repeat(np.eye(4), 3, axis=0), np.tile(np.eye(3), (4, 1)))
+_RATE = quaternion_rate(np.repeat(np.eye(4), 3, axis=1), np.tile(np.eye(3), 4)).T
 
 
 def rotations(q: Array) -> Array:

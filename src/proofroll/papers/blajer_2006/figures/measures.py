@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing
-from scipy.optimize import minimize_scalar
 
 from proofroll.core.arrays import FloatArray
 
@@ -38,6 +37,8 @@ def sinusoid(times: FloatArray, values: FloatArray) -> tuple[float, float]:
     The misfit is the root mean square of the residual over the amplitude. Level, sine and cosine are linear and are
     eliminated; the frequency is searched near the one estimated from the extremes.
     """
+    from scipy.optimize import minimize_scalar
+
     turns = _turns(values)
     if turns.size < 2:
         return float("nan"), float("nan")

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.papers.blajer_2006.ball.model import RollingBall
@@ -102,6 +101,8 @@ def euler_angles(q_WB: FloatArray, start: Sequence[float]) -> tuple[FloatArray, 
         q_WB: orientation, scalar first, identity at time 0, shape (time, 4).
         start: φ, θ, ψ at time 0 [rad].
     """
+    from scipy.spatial.transform import Rotation  # half a second, which every page would pay
+
     phi, theta, psi = start
     turned = Rotation.from_quat(np.roll(q_WB, -1, axis=1)) * Rotation.from_euler("ZXZ", [psi, theta, phi])
     with warnings.catch_warnings():  # near θ = 0 one of φ and ψ is arbitrary, which the figure shows by itself

@@ -97,10 +97,7 @@ class FigureRuns:
 
 
 def run_figures(
-    figures: Figures,
-    runner: Runner,
-    engine: str | None = None,
-    progress: Callable[[Case, Result], None] | None = None,
+    figures: Figures, runner: Runner, engine: str | None = None, progress: Callable[[Case, Result], None] | None = None
 ) -> FigureRuns:
     """Runs every case of a file in one engine and in the truth; stored results are reused.
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, hermite
 from proofroll.core.events import EventKind
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.contacts.stretches import carried
@@ -153,14 +153,12 @@ def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
         sampled: samples of those of the variables :data:`NEEDED` that the trajectory has.
         times: of the frames [s], rising from 0.
     """
-    from scipy.interpolate import CubicHermiteSpline
-
     grid = sampled["time"]
     if grid.size < 2:  # it ended before its first step
         times, p_WB = times[:1], sampled["p_WB"][:1]
     else:
         times = times[times <= grid[-1] * (1 + 1e-12)]
-        p_WB = np.asarray(CubicHermiteSpline(grid, sampled["p_WB"], sampled["v_WB"])(times))
+        p_WB = hermite(grid, sampled["p_WB"], sampled["v_WB"], times)
     normal = body.surface.normal(p_WB)
     friction = press = None
     if "N" in sampled:

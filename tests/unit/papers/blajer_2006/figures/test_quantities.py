@@ -26,6 +26,7 @@ def test_euler_angles_come_back_over_many_turns() -> None:
         assert said == pytest.approx(true, abs=1e-9)
 
 
+@pytest.mark.drill
 def test_every_known_quantity_has_values_or_is_the_engines_to_tell() -> None:
     """All but the Euler angles follow from the truth's trajectory, in the order of its samples."""
     scene = load_scene("sphere_in_cylinder")
