@@ -384,10 +384,7 @@ def _events(path_a: FollowedPath, path_b: FollowedPath, unit: float) -> Sequence
     events, least = [], ROUND_OFF + TOLERANCES[0]  # closer agreement of the routes is chance
     # One route may have more events after they part.
     for a, b in zip(path_a.happenings, path_b.happenings, strict=False):
-        time, wide = (
-            unit * float(a.time),
-            unit * (SAFETY * abs(a.time - b.time) + least * max(1.0, a.time) + a.blur),
-        )
+        time, wide = (unit * float(a.time), unit * (SAFETY * abs(a.time - b.time) + least * max(1.0, a.time) + a.blur))
         events.append(
             Event(kind=a.kind, time=time, time_low=float(time - wide), time_high=float(time + wide), name=a.name)
         )

@@ -358,9 +358,7 @@ def contact_bounces(
         ]
 
         def sampled(
-            times: Array,
-            route: ContactTree | ContactBodies = route,
-            path: HybridPath[Stretch[ContactMode]] = path,
+            times: Array, route: ContactTree | ContactBodies = route, path: HybridPath[Stretch[ContactMode]] = path
         ) -> Course:
             states = states_of(route, path, times, path.stretch_at(times))
             p, v, q, w = map(np.array, zip(*map(route.bodies, states), strict=True))

@@ -13,8 +13,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, in_single_precision, known_difference
 from proofroll.core.certificate import ROUNDED
 from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, Hypothesis, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import change_by
-from proofroll.core.diagnosis.lines import differing, single_precision
+from proofroll.core.diagnosis.fitting import change_by, differing, single_precision
 from proofroll.core.diagnosis.vectors import (
     ReportedVector,
     best_clock_factor,

@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.elements.mechanism.reading.plausibility import LARGE, doubtful_body
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.robots.files.mjcf.defaults import with_classes
+from proofroll.robots.files.mjcf.parse import with_classes
 from proofroll.robots.files.robot_file import LintRemark, RobotFile, floats, numbers
 from proofroll.robots.hypotheses.inertias import incomplete_inertias
 from proofroll.robots.model import Robot, RobotBody

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.integrators import classical_step
 from proofroll.core.number_format import error
+from proofroll.elements.mechanism.dynamics import linear_balance
 from proofroll.elements.mechanism.scene.rotations import skews
 from proofroll.robots.control.bookkeeping.air import AirForces, AirLink, AirRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
@@ -35,7 +36,6 @@ _SLOW = 0.02  # part of its largest rate below which a joint is about to turn ba
 FEWEST_ROWS = 4
 SAFETY = 10.0  # on what rounding of the record leaves, whose size is estimated and whose errors are not independent
 ROUND_OFF = 1e-9  # part of the forces: round-off of a sum of some terms
-_HAS = np.array([[1, 0, 0, 1, 1, 0], [0, 1, 0, 1, 0, 1], [0, 0, 1, 0, 1, 1]])  # moments that a component multiplies
 _EQUAL = 1e-3  # part of an interval by which intervals may differ
 _HELPS = 0.1  # part of a difference that a cause may leave
 # Number -> what it is called, and its unit; gravity and efforts are in parts of the right ones.
@@ -363,31 +363,19 @@ class AirTable:
 
     def _drag(self, forces: Sequence[AirForces], v: Array) -> Array:
         """Forces along the velocities (rows, nv) that drag of 1 1/s on each link needs, (rows, nv)."""
-        R, w, J = _bodies(forces, "R_WB", "w_WB", "J")
-        total = np.zeros(v.shape)
-        for link in self.links:
-            R_k, w_k, J_k = R[:, link.body], w[:, link.body], J[:, link.body]
-            arm = R_k @ link.com
-            velocity = np.einsum("tij,tj->ti", J_k[:, :3], v) + np.cross(w_k, arm)
-            force = link.mass * velocity * (1 + np.linalg.norm(velocity, axis=1, keepdims=True))
-            moment = np.einsum("tij,jk,tlk,tl->ti", R_k, link.inertia, R_k, w_k)
-            torque = moment * (1 + np.linalg.norm(w_k, axis=1, keepdims=True)) + np.cross(arm, force)
-            total += np.einsum("tij,ti->tj", J_k, np.concatenate([force, torque], axis=1))
-        return total
+        R, w, J = (item[:, [link.body for link in self.links]] for item in _bodies(forces, "R_WB", "w_WB", "J"))
+        mass, com, inertia = (np.array([getattr(link, name) for link in self.links]) for name in AirLink._fields[1:])
+        J[:, :, :3] -= skews((R @ com[:, :, None])[..., 0]) @ J[:, :, 3:]
+        speeds = np.einsum("tbij,tj->tbi", J[:, :, :3], v), w
+        fluid = (item * (1 + np.linalg.norm(item, axis=-1, keepdims=True)) for item in speeds)
+        return linear_balance.forces(linear_balance.moved(R, J, *fluid), mass, 0 * com, inertia)
 
     def _of_bodies(self, forces: Sequence[AirForces], rate: Array) -> Array:
         """Forces that a mass, a first moment and an inertia of each body need, (rows, bodies, nv, 10)."""
         R, w, J, bias = _bodies(forces, "R_WB", "w_WB", "J", "bias")
-        back = np.swapaxes(R, 2, 3)
         acceleration = np.einsum("tbij,tj->tbi", J, rate) + bias
-        vectors = (acceleration[..., :3] - np.array(self.robot.mechanism.gravity), acceleration[..., 3:], w)
-        pull, turning, spin = ((back @ vector[..., None])[..., 0] for vector in vectors)
-        wrench = np.zeros((*R.shape[:2], 6, 10))
-        wrench[..., :3, 0], wrench[..., 3:, 1:4] = pull, -skews(pull)
-        wrench[..., :3, 1:4] = skews(turning) + skews(spin) @ skews(spin)
-        wrench[..., 3:, 4:] = _inertial(turning) + skews(spin) @ _inertial(spin)
-        turned = np.swapaxes(J, 2, 3)
-        return np.asarray(turned[..., :3] @ R @ wrench[..., :3, :] + turned[..., 3:] @ R @ wrench[..., 3:, :])
+        pull = acceleration[..., :3] - np.array(self.robot.mechanism.gravity)
+        return linear_balance.moved(R, J, pull, acceleration[..., 3:]) + linear_balance.spun(R, J, w)
 
 
 def _armed(robot: AirRobot, law: ControlLaw, state: tuple[Array, Array]) -> AirForces:
@@ -404,8 +392,3 @@ def _bodies(forces: Sequence[AirForces], *names: str) -> list[Array]:
 def _largest(record: ControlRecord, kinds: tuple[str, ...]) -> float:
     """Largest rounding of columns whose names begin so; 0 without one."""
     return max((float(item.max()) for name, item in record.rounding.items() if name.startswith(kinds)), default=0.0)
-
-
-def _inertial(a: Array) -> Array:
-    """Matrices that turn an inertia (xx, yy, zz, xy, xz, yz) into its products with vectors (..., 3), (..., 3, 6)."""
-    return np.asarray(a[..., [[0, 0, 0, 1, 2, 0], [0, 1, 0, 0, 0, 2], [0, 0, 2, 0, 0, 1]]] * _HAS)

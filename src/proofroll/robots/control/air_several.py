@@ -6,8 +6,8 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.special import gammaincc
@@ -15,6 +15,7 @@ from scipy.special import gammaincc
 from proofroll.core.diagnosis.fitting import least_squares_parameters
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.number_format import error, with_bar
+from proofroll.elements.mechanism.dynamics.linear_balance import numbers_of
 from proofroll.robots.control.air_rows import (
     BY_JOINT,
     NUMBERS,
@@ -29,6 +30,7 @@ from proofroll.robots.control.air_rows import (
 )
 from proofroll.robots.control.bookkeeping.air import AirRobot, HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
+from proofroll.robots.control.differences import efforts_of, instant_rows
 from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, LayerCause
 from proofroll.robots.model import Array
 
@@ -198,9 +200,8 @@ def _carried(rows: AirRows) -> list[LayerCause]:
 
 def _point(numbers: Array) -> Array:
     """Mass, first moment and inertia (xx, yy, zz, xy, xz, yz) of a point of a mass with a first moment."""
-    m, (x, y, z) = numbers[0], numbers[1:]
-    xx, yy, zz, xy, xz, yz = np.array([x * x, y * y, z * z, x * y, x * z, y * z]) / (m or np.inf)
-    return np.array([m, x, y, z, yy + zz, xx + zz, xx + yy, -xy, -xz, -yz])
+    mass, com = numbers[:1], numbers[None, 1:] / (numbers[0] or np.inf)
+    return np.array([*numbers, *numbers_of(mass, com)[0, 4:]])
 
 
 def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -> str:
@@ -233,7 +234,18 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
     return f"joints have {words} {', '.join(texts)}{more} {unit} that is not told"
 
 
-def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: float) -> Layer | None:
+class WhiteNoise(NamedTuple):
+    """White noise of a record: the smooth record, and how it is smoothed."""
+
+    record: ControlRecord
+    part: float  # largest part of the range of a column
+    told: str  # clause
+    smooth: Callable[[Array], Array]
+    width: int  # rows that are smoothed together
+    kept: float  # part of a variance that smoothing leaves
+
+
+def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: str) -> Layer | None:
     """Layer of accelerations that white noise hides, with the numbers beyond their bars; None: no such noise.
 
     Smoothing is linear. So the balance of forces holds between smoothed columns, too, as far as the masses change
@@ -243,18 +255,17 @@ def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: fl
         record: of states and efforts.
         law: the law as it should be.
         held: the robot.
-        off: part of the forces that the right numbers leave without smoothing.
+        off: clause on what the right numbers leave without smoothing.
     """
-    if (smoothed := _smoothed(record)) is None:
+    if (white := white_noise(record)) is None:
         return None
-    record, noise, smooth, width = smoothed
-    robot, efforts = AirRobot.bare(held.mechanism, law), record.stacked("effort", law.joints)
-    if isinstance(motion := motion_of(record, robot), str) or efforts is None:
+    robot, efforts = AirRobot.bare(held.mechanism, law), white.record.stacked("effort", law.joints)
+    if isinstance(motion := motion_of(white.record, robot), str) or efforts is None:
         return None
     states, moving = motion
-    table = AirTable(record, law, robot, states, efforts, held.links)
-    table.signs = smooth(table.signs)
-    instants: Any = np.arange(width, len(states) - width, width)
+    table = AirTable(white.record, law, robot, states, efforts, held.links)
+    table.signs = white.smooth(table.signs)
+    instants: Any = np.arange(white.width, len(states) - white.width, white.width)
     try:
         rows = table.rows(instants, moving[0], StepScheme(), central=True)
         lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts of other instants
@@ -270,36 +281,67 @@ def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: fl
         return None
     columns = _columns(chosen) if chosen else np.zeros((len(rows.left), 0))
     causes = tuple(_told(rows, chosen, columns, _solved(columns, rows.left)[0], right_numbers(law)))
-    told = f"white noise of up to {error(100 * noise, 1)} % of a range, smoothed over {width} rows, explains it"
     numbers = "these numbers alone are" if causes else "no number is"
-    reason = f"the forces are off by {error(off)} of the largest; {told}, and {numbers} off by more than their bars"
-    return Layer("acceleration", reason=reason, causes=causes, undecided=True, noise=noise)
+    reason = f"{off}; {white.told}, and {numbers} off by more than their bars"
+    return Layer("acceleration", reason=reason, causes=causes, undecided=True, noise=white.part)
 
 
-def _smoothed(record: ControlRecord) -> tuple[ControlRecord, float, Callable[[Array], Array], int] | None:
-    """The record without most of its noise, the noise in parts of a range, what smooths, and its number of rows.
+def commanded_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot) -> Layer:
+    """Layer of accelerations of a record without efforts, under those of the law where white noise hides it."""
+    absent = "the record has no columns effort.JOINT"
+    efforts = efforts_of(record, law) if white_noise(record) else absent
+    if isinstance(efforts, str) or not np.isfinite(efforts).all():
+        return Layer("acceleration", reason=absent)
+    columns = {f"effort.{joint}": column for joint, column in zip(law.joints, efforts.T, strict=True)}
+    record = replace(record, columns={**record.columns, **columns})
+    told = f"{absent}: they are the law's for its states"
+    return noisy_layer(record, law, held, told) or Layer("acceleration", reason=absent)
 
-    The widest smoothing counts that takes away no more of any column than white noise. None: even the narrowest does,
-    or there is no noise.
+
+def noisy_efforts(record: ControlRecord, law: ControlLaw) -> Layer | None:
+    """Layer of efforts that the law gives but for white noise of states and efforts; None: more than that is left."""
+    recorded, efforts, white = record.stacked("effort", law.joints), efforts_of(record, law), white_noise(record)
+    if recorded is None or isinstance(efforts, str) or white is None:
+        return None
+    off = (recorded - efforts)[instant_rows(record, law) if law.hold_effort else np.isfinite(efforts).all(axis=1)]
+    level = np.diff(off, _DEGREE, axis=0).std(axis=0) * math.sqrt(white.kept / _OF_DIFFERENCES)
+    left = white.smooth(off)[white.width : -white.width : white.width]
+    if not len(left) or not np.all(np.sqrt(np.mean(left**2, axis=0)) <= level * (1 + _WHITE / math.sqrt(len(left)))):
+        return None
+    reason = f"efforts are off by {error(float(np.abs(off).max()))}; {white.told}, and no more is left"
+    return Layer("effort", reason=reason, undecided=True, noise=white.part)
+
+
+@lru_cache(maxsize=4)
+def white_noise(record: ControlRecord, *, efforts: bool = True) -> WhiteNoise | None:
+    """White noise of states, and of efforts if asked; None: they have other noise, or none.
+
+    The widest smoothing counts that takes away no more of any column than white noise.
     """
-    kinds = ("q.", "v.", "effort.", *(f"{name}." for name in BASE))
+    kinds = ("q.", "v.", *(f"{name}." for name in BASE), *(("effort.",) if efforts else ()))
     columns = {name: item for name, item in record.columns.items() if name.startswith(kinds) and np.ptp(item) > 0}
     if not columns:
         return None
     values = np.stack([*columns.values()], axis=1)
     ranges = np.ptp(values, axis=0)
+    least = np.maximum(
+        _QUIET * ranges, [record.rounding[name].max() if name in record.rounding else 0.0 for name in columns]
+    )
     noise = np.sqrt(np.mean(np.diff(values, _DEGREE, axis=0) ** 2, axis=0) / _OF_DIFFERENCES)
     for width in (item for item in _WIDTHS if len(values) >= _PARTS * item):
         powers = np.vander(np.arange(width) - width // 2, _DEGREE + 1, increasing=True)
         weights = np.linalg.pinv(powers)[0]  # of rows in the middle of the polynomial through them (Savitzky and Golay)
         smooth = partial(np.apply_along_axis, partial(np.convolve, weights, mode="same"), 0)
-        smoother, kept = smooth(values), weights[width // 2]  # kept: part of a variance that smoothing leaves
+        smoother, kept = smooth(values), float(weights[width // 2])
         taken = np.sqrt(np.mean((values - smoother)[width:-width] ** 2, axis=0) / (1 - kept))
         alike = 1 + _WHITE / math.sqrt(len(values))
         white = (taken <= alike * noise) & (noise <= alike * taken)
-        if np.all(white | (taken <= _QUIET * ranges)) and np.any(white & (noise > _QUIET * ranges)):
+        if np.all(white | (taken <= _QUIET * ranges)) and np.any(white & (noise > least)):
             curves = dict(zip(columns, smoother.T, strict=True))
-            return replace(record, columns={**record.columns, **curves}), float((noise / ranges).max()), smooth, width
+            smoothed = replace(record, columns={**record.columns, **curves})
+            part = float((noise / ranges).max())
+            told = f"white noise of up to {error(100 * part, 1)} % of a range, smoothed over {width} rows, explains it"
+            return WhiteNoise(record=smoothed, part=part, told=told, smooth=smooth, width=width, kept=kept)
     return None
 
 

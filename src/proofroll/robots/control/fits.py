@@ -154,7 +154,7 @@ def _falling_limit(
     if len(speeds) < 2 * _ROWS or np.ptp(speeds) <= _SAME * np.abs(speeds).max():
         return
     slope, stall = np.polyfit(speeds, forces, 1)
-    if not (slope < 0 < stall):
+    if not (slope < 0 < stall and -slope * np.ptp(speeds) > _SAME * stall):
         return
     most_effort = np.clip(stall + slope * sign * rows.v, 0.0, law.limit)
     if (residual := left(sign * np.minimum(np.abs(plain), most_effort))) <= most:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.robots.control.air_fit import AirFit, StandingFit, acceleration_fit, standing_fit
-from proofroll.robots.control.air_several import noisy_layer
+from proofroll.robots.control.air_several import commanded_layer, noisy_efforts, noisy_layer, white_noise
 from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import (
@@ -113,7 +113,7 @@ def record_layers(
         return layers
     lacking = {layer.name for layer in layers if layer.residual is None}
     layers.append(_in_air(evidence, layers, time, stepwise=stepwise))
-    if all(layer.holds for layer in layers) and lacking & {"target", "effort"}:
+    if all(layer.holds and not layer.noise for layer in layers) and lacking & {"target", "effort"}:
         layers.append(motion_layer(record, law, mechanism, lambda part: _fit_by_law(part, evidence), time))
     return layers
 
@@ -191,6 +191,8 @@ def _layer(name: str, evidence: _Evidence, skipped: Collection[str], time: Searc
         column=compared.columns[column],
         time=float(compared.time[row]),
     )
+    if name == "effort" and not layer.holds and (noisy := noisy_efforts(evidence.record, evidence.law)) is not None:
+        return noisy
     causes = {} if layer.holds else _explained(name, compared, bars, skipped, evidence, time)
     return dataclasses.replace(layer, **causes)
 
@@ -200,7 +202,7 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     record, law, assumed = evidence.in_air.reported or evidence.record, evidence.law, evidence.in_air.assumed
     efforts = record.stacked("effort", law.joints)
     if efforts is None:
-        return Layer("acceleration", reason="the record has no columns effort.JOINT")
+        return commanded_layer(record, law, evidence.in_air.held)
     fit, off_stops, remark = evidence.in_air.fit(record, law, evidence.in_air.held, efforts)
     if evidence.in_air.stepped is not None and not isinstance(fit, str) and fit.off > fit.bar:
         rival = evidence.in_air.fit(evidence.record, law, evidence.in_air.stepped, efforts)
@@ -208,20 +210,24 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
             fit, off_stops, remark = rival
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
-    if fit.off > fit.bar and not fit.causes:
-        noisy = noisy_layer(record, law, evidence.in_air.held, fit.off)
-        if noisy is not None:
-            return noisy
-    if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
+    floats, off = "q_WB.w" in record.columns, f"the forces are off by {error(fit.off)} of the largest"
+    looked_at = fit.off > fit.bar and (floats or not fit.causes)
+    white = white_noise(record, efforts=not floats) if looked_at else None
+    if white is not None and not floats and (noisy := noisy_layer(record, law, evidence.in_air.held, off)) is not None:
+        return noisy
+    if fit.off > fit.bar and not (white and floats) and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
     fit = dataclasses.replace(fit, between=fit.between and not (stepwise or _rows_are_steps(record, law)))
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
-    if fit.between:
-        off = f"the forces are off by {error(fit.off)} of the largest, and no cause is known"
+    hidden = white if floats or not fit.causes else None
+    if fit.between or hidden is not None:
         advice = f"steps between the rows may explain it: {assumed or 'log every step to decide'}"
-        return Layer("acceleration", reason="; ".join(filter(None, (off, advice, remark))), undecided=True)
+        if hidden is not None:
+            advice = f"white noise of up to {error(100 * hidden.part, 1)} % of a range may hide one"
+        reason = "; ".join(filter(None, (f"{off}, and no cause is known", advice, remark)))
+        return Layer("acceleration", reason=reason, undecided=True, noise=0.0 if hidden is None else hidden.part)
     implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
     holds = fit.off <= fit.bar and not fit.causes
     if assumed and not holds and all(cause.after > fit.bar for cause in fit.causes):

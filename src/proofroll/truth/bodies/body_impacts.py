@@ -135,11 +135,7 @@ def _onto_cones(forces: Array, friction: Array) -> Array:
 
 
 def impulses_in_turn(
-    G: Array,
-    slides: Array,
-    groups: Sequence[list[int]],
-    laws: Sequence[ImpactLaw],
-    time: float,
+    G: Array, slides: Array, groups: Sequence[list[int]], laws: Sequence[ImpactLaw], time: float
 ) -> Array:
     """Impulses of groups struck in turn, (3 contacts,): of all orders, those farthest from their mean.
 

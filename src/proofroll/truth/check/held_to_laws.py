@@ -31,11 +31,7 @@ _Path = HybridPath[Stretch[ContactMode]]
 
 
 def of_tree(
-    mechanism: Mechanism,
-    units: Units,
-    tree: ContactTree,
-    path: _Path,
-    held_path: HeldPath | None = None,
+    mechanism: Mechanism, units: Units, tree: ContactTree, path: _Path, held_path: HeldPath | None = None
 ) -> LawRecorder:
     """A path of the first route; ``mechanism`` in SI units."""
     dynamics = tree.dynamics

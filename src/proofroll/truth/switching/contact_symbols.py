@@ -22,13 +22,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import CircleShape, EllipsoidShape, HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
 from proofroll.truth.numerics.scalars import Scalar, add, dot, is_zero, minus, mul, scaled, sub
-from proofroll.truth.switching.contact_guards import (
-    LEAST_RESPONSE,
-    NOT_SHARED,
-    TURNED,
-    ContactGuard,
-    Touchable,
-)
+from proofroll.truth.switching.contact_guards import LEAST_RESPONSE, NOT_SHARED, TURNED, ContactGuard, Touchable
 
 Vector = Sequence[Scalar]
 _MOST_VELOCITIES = 10  # of one tree whose modes are compiled: 8 take a quarter of a second, 12 take eight seconds
@@ -172,11 +166,7 @@ def kink_guards(kinks: Sides) -> list[Scalar]:
 
 
 def rows_of(
-    kind: str,
-    touch: ScalarTouch,
-    line: Vector | None,
-    contact: Touchable,
-    root: Callable[[Scalar], Scalar],
+    kind: str, touch: ScalarTouch, line: Vector | None, contact: Touchable, root: Callable[[Scalar], Scalar]
 ) -> HeldRows:
     """Rows of a closed contact or law of a joint; dry friction of a joint and of turning has no normal."""
     if contact.pressed_by is not None and kind == "slip":

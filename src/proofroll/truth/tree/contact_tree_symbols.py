@@ -165,11 +165,7 @@ class TreeSymbols:
         )
 
     def _contacts(
-        self,
-        bodies: Sequence[MovingBody],
-        q: Sequence[Scalar],
-        v: Sequence[Scalar],
-        features: Features,
+        self, bodies: Sequence[MovingBody], q: Sequence[Scalar], v: Sequence[Scalar], features: Features
     ) -> tuple[list[ScalarTouch], list[tuple[dict[int, Vector], Vector]]]:
         """All contacts, and of each slide the derivative by the velocities and the rate at v̇ = 0."""
         m = self._mechanism

@@ -284,13 +284,7 @@ def _idle(
 
 
 def _all_held(
-    G: Array,
-    c: Array,
-    friction: Array,
-    bounds: Array,
-    rests: float,
-    near: float,
-    pressing: Sequence[int | None],
+    G: Array, c: Array, friction: Array, bounds: Array, rests: float, near: float, pressing: Sequence[int | None]
 ) -> Array | None:
     """Forces that let every contact stick and press within the bounds of friction, in any distribution; else None."""
     scale = natural_rows(G)

@@ -66,12 +66,7 @@ def _parallel(moved: Callable[[Array], Array], across: Array) -> Iterator[Array]
 
 
 def force_of_one(
-    G: Array,
-    c: Array,
-    friction: tuple[float, float],
-    sliding: Array | None,
-    place: tuple[str, float],
-    least: float,
+    G: Array, c: Array, friction: tuple[float, float], sliding: Array | None, place: tuple[str, float], least: float
 ) -> tuple[Array, ModeKind]:
     """Force and outcome of one contact while the other forces stay; a motion up to ``least`` counts as none.
 

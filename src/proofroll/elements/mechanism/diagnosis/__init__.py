@@ -3,7 +3,7 @@
 from functools import cache
 
 from proofroll.core.diagnosis import Hypothesis
-from proofroll.core.diagnosis.lines import built_otherwise
+from proofroll.core.diagnosis.fitting import built_otherwise
 from proofroll.core.entry_points import loaded
 from proofroll.elements.mechanism.diagnosis import contacts
 from proofroll.elements.mechanism.diagnosis.contacts import REPORTED_FORCES

@@ -16,11 +16,13 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.pressing import SCENES_LAW, ContactLimits, Pressing, Resisting, pressing
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Tree
+from proofroll.elements.mechanism.dynamics.linear_balance import forces, moved, spun
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.point_loads import PointLoad, applied_loads, bushing_loads, spring_loads
 from proofroll.elements.mechanism.dynamics.switches import switched_joints
@@ -30,7 +32,6 @@ from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION
 from proofroll.elements.mechanism.scene.model import Mechanism
 from proofroll.elements.mechanism.scene.parts import Spring
-from proofroll.elements.mechanism.scene.rotations import skews
 from proofroll.elements.mechanism.scene.signal import breaks, value_at
 
 _FITS = ((7, 5), (5, 3))
@@ -61,6 +62,14 @@ class MechanismState:
     v: FloatArray
     motion: BodyMotion
     acceleration: FloatArray
+
+    @cached_property
+    def columns(self) -> tuple[FloatArray, ...]:
+        """Forces that numbers of bodies need by accelerations, by spin, for momenta, and by unit accelerations."""
+        motion, (a, alpha) = self.motion, np.split(self.acceleration, 2, axis=1)
+        R, w, v, J = motion.R_WB[:-1], motion.w_WB[:-1], motion.v_WB[:-1], motion.J[:-1]
+        axes = np.repeat(np.eye(3)[:, None], len(R), axis=1)
+        return moved(R, J, a, alpha), spun(R, J, w), moved(R, J, v, w), moved(R, J, axes, 0 * axes)
 
 
 class MechanismStates:
@@ -235,37 +244,24 @@ class Change:
     def balance(self, states: MechanismStates, i: int) -> FloatArray:
         """Inertial forces, applied forces, and the sum of sizes of their terms, along each velocity, (3, nv)."""
         m, state, mechanism = states.mechanism, states.each[i], self.mechanism
-        motion, n = state.motion, len(m.bodies)
-        mass = np.array([b.mass for b in mechanism.bodies]) if self.mass is None else self.mass
-        com = np.array([b.com for b in mechanism.bodies]) if self.com is None else self.com
-        inertias = np.array([b.inertia for b in mechanism.bodies]) if self.inertia is None else self.inertia
+        mass, com, inertia = (
+            np.array([getattr(body, name) for body in mechanism.bodies]) if value is None else value
+            for name, value in (("mass", self.mass), ("com", self.com), ("inertia", self.inertia))
+        )
         g = np.array(mechanism.gravity) if self.gravity is None else self.gravity
-        R, w = motion.R_WB[:n], motion.w_WB[:n]
-        arm = np.einsum("nij,nj->ni", R, com)
-        inertia = R @ inertias @ R.transpose(0, 2, 1)
-        J = motion.J[:n].copy()
-        J[:, :3] -= skews(arm) @ J[:, 3:]
-        alpha = state.acceleration[:, 3:]
-        at_com = state.acceleration[:, :3] + cross(alpha, arm) + cross(w, cross(w, arm))
-        spinning = np.einsum("nij,nj->ni", inertia, w)
-        spin = cross(w, spinning) * self.gyroscopic
-        force, moment = mass[:, None] * at_com, np.einsum("nij,nj->ni", inertia, alpha)
-        terms = [np.einsum("nij,ni->j", J[:, :3], force)]
-        terms += [np.einsum("nij,ni->j", J[:, 3:], item) for item in (moment, spin)]
-        carries = motion.J[:n, :3] if self.weight_at_origin else J[:, :3]
-        acts = np.einsum("nij,ni->j", carries, mass[:, None] * g)
+        origin, none, rate = 0 * com, 0 * mass, states.v_rates[i]
+        by_acceleration, by_spin, momenta, by_axes = state.columns
+        terms = [forces(by_acceleration + by_spin, mass, com), forces(by_acceleration, none, com, inertia)]
+        terms.append(self.gyroscopic * forces(by_spin, none, com, inertia))
         by_v = [joint for joint in mechanism.joints for _ in range(joint.nv)]
-        rate = states.v_rates[i]
         terms.append((self.armature * np.array([j.armature for j in by_v]) + self.added_armature) * rate)
         if self.coupling is not None:
-            weighted = np.concatenate([mass[:, None, None] * J[:, :3], inertia @ J[:, 3:]], axis=1)
-            M = J.reshape(-1, m.nv).T @ weighted.reshape(-1, m.nv)
+            M = JointCoordinates(mechanism, rank=0).inertial(state.motion)[1]
             terms.append(-(M * self.coupling) @ rate)
+        acts = g @ forces(by_axes, mass, origin if self.weight_at_origin else com)
         acts = acts + self.torque * np.array([float(value_at(j.torque, state.t)) for j in by_v])
         acts = acts - self.friction * np.array([j.friction for j in by_v]) * np.sign(state.v)
-        momenta = mass[:, None] * (motion.v_WB[:n] + cross(w, arm)), spinning
-        for lost, carried, momentum in zip(self.decay, (J[:, :3], J[:, 3:]), momenta, strict=True):
-            acts = acts - lost * np.einsum("nij,ni->j", carried, momentum)
+        acts = acts - self.decay[0] * forces(momenta, mass, com) - self.decay[1] * forces(momenta, none, com, inertia)
         acts = acts + states.pressing(i, self.resisting).known
         for actuator in mechanism.actuators:
             at_one, rated = m.place_of(actuator.joint)
@@ -275,7 +271,7 @@ class Change:
             if joint.stiffness:
                 acts[at_v] -= self.stiffness * joint.stiffness * (state.q[at_q] - joint.rest)
         for factor, load in self._point_loads(state):
-            acts = acts + factor * load.along(motion)
+            acts = acts + factor * load.along(state.motion)
         return np.array([sum(terms), acts, sum(map(np.abs, terms)) + np.abs(acts)])
 
     def _point_loads(self, state: MechanismState) -> Iterator[tuple[float, PointLoad]]:

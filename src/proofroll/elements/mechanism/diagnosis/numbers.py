@@ -16,6 +16,7 @@ from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, 
 from proofroll.elements.mechanism.diagnosis.pressing import Resisting
 from proofroll.elements.mechanism.diagnosis.residuals import MOTION, by_rows
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.dynamics.linear_balance import steiner
 from proofroll.elements.mechanism.scene.bushing import Bushing, Six
 from proofroll.elements.mechanism.scene.checks import WORLD, ZERO
 from proofroll.elements.mechanism.scene.joint import Joint
@@ -131,12 +132,9 @@ def _reordered(inertia: FloatArray) -> Iterator[tuple[str, FloatArray]]:
 
 def _about_origin(mass: FloatArray, com: FloatArray, inertia: FloatArray) -> Iterator[tuple[str, FloatArray]]:
     """Inertias with Steiner's part added once too often or too few, of all bodies or one, each with a clause."""
-    steiner = mass[:, None, None] * (
-        np.einsum("ni,ni->n", com, com)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None, :]
-    )
     for sign, words in ((1.0, "with Steiner's part added once more"), (-1.0, "with Steiner's part taken away")):
         for which in (np.ones(len(mass)), *np.eye(len(mass))):
-            moved = inertia + sign * which[:, None, None] * steiner
+            moved = inertia + sign * which[:, None, None] * steiner(mass, com)
             if np.min(np.linalg.eigvalsh(moved)) >= 0:
                 yield f"the inertia is about the wrong point: that about the centre of mass {words}", moved
 

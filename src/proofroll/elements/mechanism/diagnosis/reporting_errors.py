@@ -11,7 +11,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, known_difference, largest_difference, longest
 from proofroll.core.diagnosis import Cause, Difference, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.lines import differing
+from proofroll.core.diagnosis.fitting import differing
 from proofroll.core.diagnosis.samples import (
     another_clock,
     at_start,
@@ -192,10 +192,7 @@ REPORTING_ERRORS: tuple[Any, ...] = (
         _size,
         lambda vector, evidence: (*_of_centres(vector, evidence), *_of_contacts(vector, evidence)),
     ),
-    at_start(
-        lambda element: {name: frame[0] for name, frame in frames_of(element, element.start).items()},
-        _FOLLOWS,
-    ),
+    at_start(lambda element: {name: frame[0] for name, frame in frames_of(element, element.start).items()}, _FOLLOWS),
     centres_at_start,
     reported_quaternions(_attitudes),
     single_precision_run,

@@ -9,8 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import ABOVE, CauseRow, Residuals, cached_on_evidence, in_doubt
-from proofroll.core.diagnosis.lines import differing
+from proofroll.core.diagnosis.fitting import ABOVE, CauseRow, Residuals, cached_on_evidence, differing, in_doubt
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import (
     Change,

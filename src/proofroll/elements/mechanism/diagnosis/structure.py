@@ -8,8 +8,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Difference, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import CauseRow, Residuals
-from proofroll.core.diagnosis.lines import differing, scale_of
+from proofroll.core.diagnosis.fitting import CauseRow, Residuals, differing, scale_of
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import InputError
 from proofroll.core.first_steps import OF_FIRST_STEPS

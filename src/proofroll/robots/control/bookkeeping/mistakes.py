@@ -122,7 +122,11 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
     if law.policy is not None:
         yield from _of_observations(law)
         yield from _of_actions(law)
-    elif any(law.pose):
+    else:
+        for words, order in orders(law.joints):
+            sentence = f"targets are for joints in another order ({words})"
+            yield _fixed("joint_order", sentence, "target", targets=tuple(law.targets[k] for k in np.argsort(order)))
+    if law.policy is None and any(law.pose):
         yield _fixed("pose_missing", "the default pose is missing", "target", targets=(0.0,) * len(law.joints))
     for instants, words in ((1, "one instant"), (2, "two instants")):
         yield _fixed("late", f"targets act {words} late", "target", delay=law.delay + instants)

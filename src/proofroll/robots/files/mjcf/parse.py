@@ -7,11 +7,11 @@ import math
 from collections import Counter
 from collections.abc import Container, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted
-from proofroll.robots.files.mjcf.defaults import Classed, classed
 from proofroll.robots.files.robot_file import (
     MOST_ELEMENTS,
     Expand,
@@ -24,6 +24,7 @@ from proofroll.robots.files.robot_file import (
     required_file,
 )
 
+_MAIN = "main"  # default class of elements that name none
 # Largest depth of includes.
 _DEEPEST = 8
 _MOST_MODELS = 32
@@ -38,6 +39,65 @@ NO_SHAPE = "it collides in the file, and no copy has it"
 COMPENSATION = "its gravity compensation is left out, as actuators are; all engines read it without"
 # Macros, which the engine that defines the format writes out.
 _MACROS = {"replicate", "attach", "composite"}
+
+
+class Classed(NamedTuple):
+    """Element below <worldbody> with the attributes of its default class.
+
+    Attributes:
+        element: the element.
+        parent: the element around it.
+        body: the body, or the world, to which it belongs.
+        given: its attributes, own and inherited from its class.
+    """
+
+    element: Element
+    parent: Element
+    body: Element
+    given: dict[str, str]
+
+
+def classed(root: Element, tag: str) -> Iterator[Classed]:
+    """All elements of a tag below <worldbody>, in the order of the file."""
+    classes = _classes(root, tag)
+
+    def below(parent: Element, body: Element, inherited: str) -> Iterator[Classed]:
+        inherited = parent.get("childclass", inherited)
+        for child in parent:
+            if child.tag == tag:
+                yield Classed(child, parent, body, classes.get(child.get("class", inherited), {}) | child.attrib)
+            else:
+                yield from below(child, child if child.tag == "body" else body, inherited)
+
+    for world in root.findall("worldbody"):
+        yield from below(world, world, _main(root))
+
+
+def with_classes(root: Element, tag: str) -> Iterator[tuple[Element, dict[str, str]]]:
+    """All elements of a tag below <worldbody>, with their attributes, own and inherited from the class."""
+    return ((item.element, item.given) for item in classed(root, tag))
+
+
+def _main(root: Element) -> str:
+    """Name of the class of elements that name none."""
+    return next((default.get("class", _MAIN) for default in root.findall("default")), _MAIN)
+
+
+def _classes(root: Element, tag: str) -> dict[str, dict[str, str]]:
+    """Class -> attributes that it gives to elements of a tag, own and inherited from the classes around it."""
+    classes: dict[str, dict[str, str]] = {}
+
+    def collect(default: Element, outer: dict[str, str]) -> None:
+        name = default.get("class", _MAIN)
+        classes[name] = classes.get(name, {}) | outer
+        for element in default.findall(tag):
+            classes[name] |= element.attrib
+        for inner in default.findall("default"):
+            collect(inner, classes[name])
+
+    for default in root.findall("default"):
+        collect(default, {})
+    return classes
 
 
 def neutral_mjcf(

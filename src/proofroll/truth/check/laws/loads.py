@@ -119,10 +119,7 @@ def spring_ends(scene: LawScene, pieces: BodyPoses, link: Spring | Bushing) -> t
     """Ends of a spring or bushing on its bodies [m]."""
     a, b = (
         pieces.p[..., body, :] + turned(pieces.R[..., body, :, :], np.array(position))
-        for body, position in (
-            (scene.index[link.body_a], link.position_a),
-            (scene.index[link.body_b], link.position_b),
-        )
+        for body, position in ((scene.index[link.body_a], link.position_a), (scene.index[link.body_b], link.position_b))
     )
     return a, b
 

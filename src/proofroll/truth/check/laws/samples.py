@@ -75,11 +75,7 @@ def _newton_and_euler(
         unknown.take(contact.a, contact.b, place, np.isnan(force), np.isnan(moment) & pressed)
     mass, trace = scene.mass[:bodies], np.trace(scene.inertia, axis1=-2, axis2=-1)[:bodies]
     left = np.concatenate(
-        [
-            mass[:, None] * acceleration - loads.force[..., :bodies, :],
-            spin_rate - loads.moment[..., :bodies, :],
-        ],
-        -1,
+        [mass[:, None] * acceleration - loads.force[..., :bodies, :], spin_rate - loads.moment[..., :bodies, :]], -1
     )
     half, bars = np.maximum(places.half, np.finfo(float).tiny)[:, None, None], published.bars
     off = (
@@ -193,12 +189,7 @@ def kinetic_energy(scene: LawScene, moving: BodyPoses) -> tuple[Array, Array]:
 
 
 def _power(
-    scene: LawScene,
-    tiles: Tiles,
-    places: Places,
-    published: PublishedValues,
-    residuals: LawResiduals,
-    loads: BodyLoads,
+    scene: LawScene, tiles: Tiles, places: Places, published: PublishedValues, residuals: LawResiduals, loads: BodyLoads
 ) -> None:
     """Kinetic energy and that of gravity change by the power of all forces."""
     total, size = kinetic_energy(scene, tiles)

@@ -52,10 +52,7 @@ def _coordinates(scene: LawScene, published: PublishedValues, residuals: LawResi
             continue
         connection = scene.connections[number]
         placed = scene.placed(connection, pieces)
-        place, (_, rate, turns) = (
-            coordinate_of(scene, number, 0, pieces, placed),
-            placed.free(connection.kind)[0],
-        )
+        place, (_, rate, turns) = (coordinate_of(scene, number, 0, pieces, placed), placed.free(connection.kind)[0])
         unit = 1.0 if turns else scene.length
         for name, value, size in (("q", place, unit), ("v", rate, unit * scene.rate)):
             off = published.values[f"{name}.{joint.name}"][:, None] - value

@@ -175,13 +175,7 @@ def table(body: BodyOnWall, weight: float, lengths: Sequence[float]) -> tuple[Ob
         ),
         residual("creep", "m", "way slipped while sticking", a, always=always),
         Observable(
-            "first_slip",
-            "s",
-            "time of the first slip",
-            Role.EVENT,
-            absent=reason,
-            watched=bool(bounded),
-            always=always,
+            "first_slip", "s", "time of the first slip", Role.EVENT, absent=reason, watched=bool(bounded), always=always
         ),
         Observable("event_times", "s", "times of all events", Role.EVENT, asked_for=False),
         Observable("event_order", "events", "events of another kind than the truth's", Role.EVENT, asked_for=False),
