@@ -23,8 +23,9 @@ _GRADED: FloatArray = 0.5 ** np.arange(3.0, 15.0)
 _BESIDE = 8 * float(np.finfo(float).eps)
 # Most impacts whose energies and heights are found: a motion that comes to rest has hundreds, each lower.
 _MOST = 100
-# Steps by which the time of a crest is improved.
-_IMPROVED = 4
+# Most steps by which times of crests are improved, and change, relative to a time, by which they may end: each step has
+# about a hundredth of the one before left, and a height has the square of it.
+_IMPROVED, _STILL = 12, 1e-10
 _COLUMNS = (
     ("event_energy_before", "energy_before", "J", "energy before an impact"),
     ("event_energy_after", "energy_after", "J", "energy after an impact"),
@@ -140,12 +141,13 @@ def exact_bounces(
     inside = (stops[:-1, None] + np.diff(stops)[:, None] * parts).ravel()
     times = np.unique(np.concatenate([*beside, inside, rebounds, [end]]))
     times = times[(times >= 0) & (times <= end)]
-    course = sampled(times)
+    course, last = sampled(times), np.zeros(0)
     for _ in range(_IMPROVED):
         crests = _crests(course, sharp, bodies)
         new = np.setdiff1d(crests[(crests > 0) & (crests < end)], course.time)
-        if not new.size:
+        if not new.size or (len(crests) == len(last) and np.allclose(crests, last, rtol=_STILL, atol=0.0)):
             break
+        last = crests
         more = sampled(new)
         order = np.argsort(np.concatenate([course.time, more.time]), kind="stable")
         course = Course(*(np.concatenate(pair)[order] for pair in zip(course, more, strict=True)))
