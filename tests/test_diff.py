@@ -70,22 +70,24 @@ def test_events_of_two_engines_are_compared(proofroll: Proofroll, run: Callable[
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("run.nc", "report.json", "new = 'report.json': is of another kind than {run}; name two reports or two runs"),
+        ("run.nc", "{report}", "is of another kind than {run}; name two reports or two runs"),
         ("run.nc", "{ball}", "is a run of bouncing_ball, and {run} one of pendulum; name two runs of one scene"),
-        ("run.nc", "absent.nc", "new = 'absent.nc': cannot be read as a run:"),
+        ("run.nc", "absent.nc", "new = 'absent.nc': there is no such file; give two reports, two runs, or"),
         ("run.csv", "run.nc", "run = 'run.csv': names no scene; write it as .nc or .npz, or judge it"),
-        ("absent", "run", "old = 'absent': cannot be read: No such file"),
+        ("absent", "run", "old = 'absent': there is no such file"),
         ("mujoco@1", "exudyn@1", "new = 'exudyn@1': is no version of mujoco; name two of one engine"),
     ],
 )
 def test_what_cannot_be_compared_is_said(
-    proofroll: Proofroll, run: Callable[..., Path], old: str, new: str, says: str
+    proofroll: Proofroll, run: Callable[..., Path], tmp_path: Path, old: str, new: str, says: str
 ) -> None:
     """Two things of different kinds, scenes or engines, and files that are not there, are one line; exit 2."""
     names = {
         "run": str(run("run.nc", "--engine", "mujoco")),
         "ball": str(run("truth.nc", "--engine", "truth", scene="bouncing_ball")),
+        "report": str(tmp_path / "report.json"),
     }
+    Path(names["report"]).write_text("{}")
     code, _, err = proofroll("diff", names["run"] if old == "run.nc" else old, new.format(**names))
     assert code == 2
     assert says.format(**names) in err

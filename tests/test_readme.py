@@ -17,7 +17,7 @@ import pytest
 from PIL import Image
 
 from proofroll.files.comparison_file import load_comparison
-from proofroll.report.labels import engine_title, step
+from proofroll.report.labels import engine_title, preset_name, step
 from proofroll.running.case import EngineFacts
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -155,7 +155,7 @@ def complaint(text: str, settings: list[EngineFacts], now: str) -> str:
         expected = [
             engine_title(found.name),
             str(found.settings.get("formulation")),
-            str(found.settings["preset"]),
+            preset_name(found.settings["preset"]),
             shown,
         ]
         if cells[:4] != expected:

@@ -51,14 +51,14 @@ def sort(live: Visit, name: str, wanted: str) -> None:
 def test_a_table_sorts_by_a_column(live: Visit) -> None:
     """By keys: settings keep their engine, errors sort as numbers, verdicts from best to worst and back."""
     settings = column(live, 0)
-    assert settings == ["alpha fine matched", "alpha fine default", "beta only", "gamma"]
+    assert settings == ["alpha fine matched", "alpha fine as installed", "beta only", "gamma"]
     sort(live, "worst error", "ascending")
     errors = [float(text) for text in column(live, 3) if text]
     assert errors == sorted(errors)
     assert len(errors) == 3
     assert column(live, 0)[-1] == "gamma", "what has no number comes last"
     sort(live, "worst error", "descending")
-    assert column(live, 0)[1:] == ["alpha fine default", "beta only", "alpha fine matched"]
+    assert column(live, 0)[1:] == ["alpha fine as installed", "beta only", "alpha fine matched"]
     sort(live, "verdict", "ascending")
     verdicts = [text.split()[1].removesuffix("not") for text in column(live, 2)]
     assert verdicts == ["agrees", "incomplete", "differs", "missing"]
@@ -91,7 +91,7 @@ def test_a_table_downloads_as_csv(live: Visit, tmp_path: Path) -> None:
     text = (tmp_path / "table.csv").read_text(encoding="utf-8-sig")
     head, *rows = filter(None, csv.reader(text.splitlines()))
     assert head[:3] == ["setting", "step", "verdict"]
-    assert [row[0] for row in rows] == ["alpha fine matched", "alpha fine default", "beta only", "gamma"]
+    assert [row[0] for row in rows] == ["alpha fine matched", "alpha fine as installed", "beta only", "gamma"]
     assert all(len(row) == len(head) for row in rows)
     assert rows[1][4].split()[1] == "differs"
     assert rows[1][5].startswith("+ ")

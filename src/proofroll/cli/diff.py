@@ -68,11 +68,11 @@ def _of_files(old: str, new: str) -> tuple[bool, list[str], str, object]:
     from proofroll.files.trajectory_file import CSV, NETCDF, STORED
 
     are_runs = [Path(text).suffix in (NETCDF, STORED) for text in (old, new)]
-    for text in (old, new):
+    for field, text in (("old", old), ("new", new)):
         if Path(text).suffix == CSV:
             raise InputError("run", text, f"names no scene; write it as {NETCDF} or {STORED}, or judge it")
         if not Path(text).exists():
-            raise InputError("diff", text, "there is no such file; give two reports, two runs, or two ENGINE@VERSION")
+            raise InputError(field, text, "there is no such file; give two reports, two runs, or two ENGINE@VERSION")
     if any(are_runs) != all(are_runs):
         raise InputError("new", new, f"is of another kind than {old}; name two reports or two runs")
     if all(are_runs):

@@ -223,8 +223,8 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
 
         def line() -> str:
             now = progress.tasks[0]
-            done = "" if now.total is None and not now.completed else f": {now.completed:g}"
-            return f"{now.description}{done}{'' if now.total is None else f' of {now.total:g}'}"
+            amount = "" if now.total is None and not now.completed else f": {now.completed:g}"
+            return f"{now.description}{amount}{'' if now.total is None else f' of {now.total:g}'}"
 
         with nullcontext() if moves else _now_and_then(line):
             yield lambda description, count=1, total=None: progress.update(

@@ -115,9 +115,9 @@ def _show(
     page = partial(_write, out, scene, begun=time.monotonic())
     runs: list[xr.Dataset] = []
     truths: list[xr.Dataset] = []
-    untold, asked = "its truth is still being computed", 0
+    reason, count = "its truth is still being computed", 0
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(1) as pool:
-        ready = {engines[0]: pool.submit(prepare, engines[0], workers)}
+        starts = {engines[0]: pool.submit(prepare, engines[0], workers)}
         from proofroll.core.pace import PACE
         from proofroll.core.truth import truth
         from proofroll.files.trajectory_file import STORED, import_xarray, read
@@ -127,10 +127,10 @@ def _show(
 
         import_xarray()
         loaded, length = scene_of_run(scene, settings), length_of(scene, until)
-        ready |= {name: pool.submit(prepare, name, workers) for name in engines if name not in ready}
+        starts |= {name: pool.submit(prepare, name, workers) for name in engines if name not in starts}
         every = max(_UNIT, round(length / _INTERVALS / _UNIT) * _UNIT)
         for name in engines:
-            ready[name].result()
+            starts[name].result()
             target = Path(folder) / f"{len(runs)}{STORED}"
             try:
                 case = single_case(scene, settings, name, until=length, every=every, time_limit=_LIMIT, workers=workers)
@@ -142,16 +142,16 @@ def _show(
                 options.complain(f"{name} {result.status}: {result.message}")
                 continue
             runs.append(read(target).load())
-            if not asked:
-                page(runs, untold=untold)
+            if not count:
+                page(runs, untold=reason)
             longest = max((run["time"].to_numpy() for run in runs), key=len)
-            if asked < len(longest):
-                asked = len(longest)
+            if count < len(longest):
+                count = len(longest)
                 try:
                     with PACE.limited(_LIMIT):
                         truths = [truth(loaded.fully_asked, longest)]
                 except ProofrollError as problem:
-                    untold = str(problem)
-            page(runs, true=truths[-1]) if truths else page(runs, untold=untold)
+                    reason = str(problem)
+            page(runs, true=truths[-1]) if truths else page(runs, untold=reason)
     if not runs:
         raise ProofrollError(f"{scene}: no engine runs it; proofroll engines tells what is installed")

@@ -55,8 +55,8 @@ def hermite(grid: FloatArray, values: FloatArray, rates: FloatArray, times: Floa
     rows = (-1, *[1] * (values.ndim - 1))
     step = np.diff(grid)[index].reshape(rows)
     s = (times - grid[index]).reshape(rows) / step
-    bent = s * (1 - s) * step * ((1 - s) * rates[index] - s * rates[index + 1])
-    return np.asarray(values[index] + s * s * (3 - 2 * s) * (values[index + 1] - values[index]) + bent)
+    bend = s * (1 - s) * step * ((1 - s) * rates[index] - s * rates[index + 1])
+    return np.asarray(values[index] + s * s * (3 - 2 * s) * (values[index + 1] - values[index]) + bend)
 
 
 def slices(counts: Iterable[int]) -> tuple[slice, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -42,19 +43,12 @@ def test_a_watched_scene_without_a_truth(proofroll: Proofroll, tmp_path: Path, m
     def refuse(*_: object) -> None:
         raise Refused("no two routes cover it")
 
+    for keeping in ("report.run.replay", "studies.judging.judge"):  # the truth that they are imported with
+        import_module(f"proofroll.{keeping}")
     monkeypatch.setattr("proofroll.core.truth.truth", refuse)
     page = tmp_path / "page.html"
-    words = [
-        "--engine",
-        "projection",
-        "--engine",
-        "projection[rtol=1e-6]",
-        "--until",
-        "0.1",
-        "--out",
-        str(page),
-        "--once",
-    ]
+    words = ["--engine", "projection", "--engine", "projection[rtol=1e-6]", "--until", "0.1", "--out", str(page)]
+    words.append("--once")
     code, _, err = proofroll("watch", "pendulum", *words)
     assert code == 0, err
     assert err.splitlines()[-1].rpartition(",")[0].endswith("projection, projection")

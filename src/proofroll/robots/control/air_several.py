@@ -239,7 +239,7 @@ class WhiteNoise(NamedTuple):
 
     record: ControlRecord
     part: float  # largest part of the range of a column
-    told: str  # clause
+    clause: str  # on it
     smooth: Callable[[Array], Array]
     width: int  # rows that are smoothed together
     kept: float  # part of a variance that smoothing leaves
@@ -282,7 +282,7 @@ def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: st
     columns = _columns(chosen) if chosen else np.zeros((len(rows.left), 0))
     causes = tuple(_told(rows, chosen, columns, _solved(columns, rows.left)[0], right_numbers(law)))
     numbers = "these numbers alone are" if causes else "no number is"
-    reason = f"{off}; {white.told}, and {numbers} off by more than their bars"
+    reason = f"{off}; {white.clause}, and {numbers} off by more than their bars"
     return Layer("acceleration", reason=reason, causes=causes, undecided=True, noise=white.part)
 
 
@@ -294,8 +294,8 @@ def commanded_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot) -> 
         return Layer("acceleration", reason=absent)
     columns = {f"effort.{joint}": column for joint, column in zip(law.joints, efforts.T, strict=True)}
     record = replace(record, columns={**record.columns, **columns})
-    told = f"{absent}: they are the law's for its states"
-    return noisy_layer(record, law, held, told) or Layer("acceleration", reason=absent)
+    clause = f"{absent}: they are the law's for its states"
+    return noisy_layer(record, law, held, clause) or Layer("acceleration", reason=absent)
 
 
 def noisy_efforts(record: ControlRecord, law: ControlLaw) -> Layer | None:
@@ -308,7 +308,7 @@ def noisy_efforts(record: ControlRecord, law: ControlLaw) -> Layer | None:
     left = white.smooth(off)[white.width : -white.width : white.width]
     if not len(left) or not np.all(np.sqrt(np.mean(left**2, axis=0)) <= level * (1 + _WHITE / math.sqrt(len(left)))):
         return None
-    reason = f"efforts are off by {error(float(np.abs(off).max()))}; {white.told}, and no more is left"
+    reason = f"efforts are off by {error(float(np.abs(off).max()))}; {white.clause}, and no more is left"
     return Layer("effort", reason=reason, undecided=True, noise=white.part)
 
 
@@ -340,8 +340,8 @@ def white_noise(record: ControlRecord, *, efforts: bool = True) -> WhiteNoise | 
             curves = dict(zip(columns, smoother.T, strict=True))
             smoothed = replace(record, columns={**record.columns, **curves})
             part = float((noise / ranges).max())
-            told = f"white noise of up to {error(100 * part, 1)} % of a range, smoothed over {width} rows, explains it"
-            return WhiteNoise(record=smoothed, part=part, told=told, smooth=smooth, width=width, kept=kept)
+            words = f"white noise of up to {error(100 * part, 1)} % of a range, smoothed over {width} rows, explains it"
+            return WhiteNoise(record=smoothed, part=part, clause=words, smooth=smooth, width=width, kept=kept)
     return None
 
 

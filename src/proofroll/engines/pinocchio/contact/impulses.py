@@ -355,11 +355,11 @@ class ImpulseSteps:
             soft = [a >= soft_speed - _SOFT * abs(bend) for a, (_, _, bend) in zip(approach, turning, strict=True)]
 
         def pressed(impulses: Array) -> Pressed:
-            moved = terms
+            loaded = terms
             if impulses.any():
                 free, at_free = terms.free + terms.inverse @ impulses, terms.at_free + impulses @ terms.into
-                moved = terms._replace(free=free, at_free=at_free)
-            kick = self._solved(moved, shifts, span, convex=convex)
+                loaded = terms._replace(free=free, at_free=at_free)
+            kick = self._solved(loaded, shifts, span, convex=convex)
             return kick, [dot(touching[k].normal, kick.impulse[k]) if soft[k] else 0.0 for k in self._pressed_by]
 
         kick, moments, impulses = self._moments.found(rows, J, v, terms.inverse, pressed, self.t)

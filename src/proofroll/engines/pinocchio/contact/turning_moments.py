@@ -74,7 +74,7 @@ class TurningImpulses:
         """
         both, count = rows.reshape(-1, len(v)), 3 * len(self.frictions)
         turning_rows, before = both[:count], (both[count:] @ v).tolist()
-        frees = ((turning_rows @ inverse) * turning_rows).sum(axis=1).reshape(-1, 3).sum(axis=1).tolist()
+        responses = ((turning_rows @ inverse) * turning_rows).sum(axis=1).reshape(-1, 3).sum(axis=1).tolist()
         moments, impulses = [0.0] * count, np.zeros(len(v))
         eases = dict[tuple[int, States], float]()  # what is held is mostly the same in all solutions of a step
         for _ in range(_MOST):
@@ -85,7 +85,7 @@ class TurningImpulses:
                 own, held = slice(3 * k, 3 * k + 3), (k, outcome.states)
                 moves = bool(friction.bend) and outcome.states[friction.pressed_by] == SLIP
                 # what turns faster is not stopped within the bound: contacts only lessen its response
-                moves = moves or math.hypot(*rates[own]) > frees[k] * (bound + math.hypot(*last[own]))
+                moves = moves or math.hypot(*rates[own]) > responses[k] * (bound + math.hypot(*last[own]))
                 if not moves:
                     if held not in eases:
                         eases[held] = _ease(rows[0, k], J, inverse, outcome.states)
