@@ -202,6 +202,7 @@ def _stack(rates: Mapping[str, Array], joints: tuple[str, ...], dofs: tuple[int,
     return np.concatenate(parts, axis=1)
 
 
+WATCHED = 1.0  # s: duration of the run in which shapes that come near each other are looked for
 OVERLAPPING_DROP = 0.01  # m: height over the floor of a robot that its file lets overlap the floor
 
 

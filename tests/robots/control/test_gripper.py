@@ -90,6 +90,7 @@ def test_a_box_is_lifted_and_dropped_or_slips(gripper: tuple[Path, Path], fricti
 @pytest.mark.nightly
 def test_engines_lift_as_the_reference_does(gripper: tuple[Path, Path], tmp_path: Path) -> None:
     """MuJoCo with hard contacts lifts the box as the reference by steps does, and the file as it is lets it creep."""
+    pytest.importorskip("pinocchio")
     robot, control = gripper
     scene = with_control(str(robot), control)
     outcome = compare(scene, until=0.8, budget=300, out=tmp_path)

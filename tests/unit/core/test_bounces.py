@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounces import Bounce, Course, bounces_along, bounces_of, exact_bounces
@@ -52,6 +53,20 @@ def test_heights_between_samples_are_those_of_parabolas() -> None:
     assert found[2].height == pytest.approx(_E**6, rel=1e-12)
     early = bounces_along(_ball(times[times < 1.3]), events[:2], {"c": 0})
     assert np.isnan(early[1].height)  # its apex lies behind the end
+
+
+def test_the_height_of_what_is_pulled_unevenly_is_exact() -> None:
+    """The first apex of a centre of mass that swings while it rises, by the closed form: the pull changes beside it."""
+
+    def swinging(times: FloatArray) -> Course:
+        height = 0.3 * times - 2 * times**2 + 2e-3 * (np.cos(40 * times) - 1)
+        climb = 0.3 - 4 * times - 0.08 * np.sin(40 * times)
+        return Course(times, np.zeros(len(times)), height[:, None], climb[:, None])
+
+    hit, crest = 1e-3, brentq(lambda t: 0.3 - 4 * t - 0.08 * np.sin(40 * t), 1e-3, 0.1, xtol=1e-16)
+    (found,) = exact_bounces(swinging, [Event("impact", hit, hit, hit, "c")], {"c": 0}, 0.12)
+    beside = swinging(np.array([hit, crest])).height[:, 0]
+    assert found.height == pytest.approx(beside[1] - beside[0], abs=1e-15)  # some hundred times the round-off of 7 mm
 
 
 def test_a_motion_that_can_be_sampled_anywhere_gives_exact_bounces() -> None:

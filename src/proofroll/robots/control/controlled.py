@@ -43,7 +43,7 @@ from proofroll.robots.files.scene_tables import (
 )
 from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis, hypotheses
 from proofroll.robots.model import Array, Robot
-from proofroll.robots.protocol import Reading, lift
+from proofroll.robots.protocol import WATCHED, Reading, lift
 from proofroll.robots.states import RobotStates
 
 if TYPE_CHECKING:
@@ -70,8 +70,8 @@ _STANDING = 0.3  # s: duration of a robot on a ground, which lands and stands by
 _SEEN = 1e-6  # m: way of a robot at its start that is told
 _GROUND_WORDS = "what the robot stands on: nothing (0), the floor of its file (1), or a plane z = 0 (2)"
 _STEEP = 0.1  # cosine between the normal of a plane and the vertical from which on it is a wall
-# Times of the second in which is looked who touches whom, at which servos get their targets [s].
-_WATCHED = (np.arange(50) / 50).tolist()
+# Times at which servos get their targets while is looked who touches whom [s].
+_WATCHED = (np.arange(50) / 50 * WATCHED).tolist()
 _ABOVE = 10.0  # m: by which a robot is lifted while the heights of its shapes are measured
 
 

@@ -30,6 +30,7 @@ from proofroll.robots.files.mjcf.parse import NO_SHAPE
 from proofroll.robots.files.robot_file import RobotFile, read_xml
 from proofroll.robots.files.urdf import BASE_JOINT
 from proofroll.robots.model import NO_BODY, Array, Robot
+from proofroll.robots.protocol import WATCHED
 from proofroll.robots.states import RobotStates
 
 # What a robot stands on: the number of each in the parameter ``ground`` of a scene.
@@ -321,7 +322,7 @@ def _tables(
         advice = "give [ground] feet = {LINK = radius}, or take --ground plane or none"
         raise InputError("ground", file.path, f"{near}; {advice}")
     left_out += [f"edges of {face}, which is endless for {_listed(shapes)}" for face, shapes in endless.items()]
-    left_out.append("pairs of shapes that come near only after 1 s, or in another motion")
+    left_out.append(f"pairs of shapes that come near only after {WATCHED:g} s, or in another motion")
     return GroundTables(list(geometries.values()), rows, _about(stands, others), left_out)
 
 

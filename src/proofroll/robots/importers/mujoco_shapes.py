@@ -10,12 +10,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from proofroll.robots.protocol import lift
+from proofroll.robots.protocol import WATCHED, lift
 
 # Distance that counts as near, and the largest one between a floor and the lowest shape above it [m].
 _NEAR, _HIGH = 0.02, 10.0
-# Duration of the run [s], and its largest number of steps times velocities.
-_SECONDS, _MOST = 1.0, 2e5
+# Largest number of steps of the run times velocities.
+_MOST = 2e5
 # Cosine between the normals of a contact and of a face from which on the contact is one of this face (MuJoCo may give
 # that of the other face of almost parallel ones), and way of its place from the border of the face [m].
 _UPRIGHT, _WITHIN = 0.99, 1e-3
@@ -57,9 +57,9 @@ def near_shapes(
     _widen(model.geom_gap, model.geom_margin, _NEAR / 2 if _gap_widens() else _NEAR)
     _widen(model.pair_gap, model.pair_margin, _NEAR)
     places = [int(model.joint(name).qposadr[0]) for name in servos]
-    for step in range(min(int(_SECONDS / model.opt.timestep), int(_MOST / max(model.nv, 1)))):
+    for step in range(min(int(WATCHED / model.opt.timestep), int(_MOST / max(model.nv, 1)))):
         for place, (_, _, targets, _) in zip(places, servos.values(), strict=True):
-            model.qpos_spring[place] = model.qpos0[place] + targets[int(len(targets) * data.time / _SECONDS)]
+            model.qpos_spring[place] = model.qpos0[place] + targets[int(len(targets) * data.time / WATCHED)]
         mujoco.mj_step(model, data)
         if not np.isfinite(data.qacc).all() or data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number:
             break

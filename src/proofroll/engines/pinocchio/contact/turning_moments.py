@@ -82,19 +82,19 @@ class TurningImpulses:
             rates = (both @ outcome.v).tolist()
             bounds = [friction.friction * size for friction, size in zip(self.frictions, normal, strict=True)]
             for k, (friction, bound) in enumerate(zip(self.frictions, bounds, strict=True)):
-                own, held = slice(3 * k, 3 * k + 3), (k, outcome.states)
+                part, key = slice(3 * k, 3 * k + 3), (k, outcome.states)
                 moves = bool(friction.bend) and outcome.states[friction.pressed_by] == SLIP
                 # what turns faster is not stopped within the bound: contacts only lessen its response
-                moves = moves or math.hypot(*rates[own]) > responses[k] * (bound + math.hypot(*last[own]))
+                moves = moves or math.hypot(*rates[part]) > responses[k] * (bound + math.hypot(*last[part]))
                 if not moves:
-                    if held not in eases:
-                        eases[held] = _ease(rows[0, k], J, inverse, outcome.states)
-                    if eases[held]:
-                        moments[own] = minus(last[own], scaled(1.0 / eases[held], rates[own]))
-                    moves = math.hypot(*moments[own]) > bound
+                    if key not in eases:
+                        eases[key] = _ease(rows[0, k], J, inverse, outcome.states)
+                    if eases[key]:
+                        moments[part] = minus(last[part], scaled(1.0 / eases[key], rates[part]))
+                    moves = math.hypot(*moments[part]) > bound
                 if moves:
-                    direction = plus(before[own], rates[count:][own])
-                    moments[own] = scaled(-bound / (math.hypot(*direction) or 1.0), direction)
+                    direction = plus(before[part], rates[count:][part])
+                    moments[part] = scaled(-bound / (math.hypot(*direction) or 1.0), direction)
             impulses = np.array(moments) @ turning_rows
             if max(map(abs, map(sub, moments, last))) <= _SETTLED * self._tolerance * max(bounds):
                 return outcome, np.array(moments).reshape(-1, 3), impulses
