@@ -77,6 +77,14 @@ STEPS: dict[str, tuple[str, set[str]]] = {
         f"from proofroll.running.identity import describe\nfor name in {ENGINES}:\n    describe(name)",
         {"xarray", "pandas", "scipy.integrate", "scipy.spatial", "scipy.optimize"},
     ),
+    "scene of a robot": (
+        "from proofroll.files.scene_file import load_scene; load_scene('arm.urdf')",
+        {"scipy.integrate", "scipy.spatial", "proofroll.robots.control.bookkeeping.air"},
+    ),
+    "truths of other scenes": (
+        "import proofroll.papers.blajer_2006.truth.plug_in, proofroll.truth.plug_in",
+        {"scipy.integrate", "scipy.spatial", "scipy.optimize"},
+    ),
     "a function that no module of its name takes over": (
         "import proofroll; first = proofroll.simulate; from proofroll import simulate\n"
         "assert callable(first) and callable(simulate) and callable(proofroll.simulate)",

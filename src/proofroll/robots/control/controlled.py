@@ -25,7 +25,6 @@ from proofroll.elements.mechanism.scene.model import TOGETHER
 from proofroll.elements.mechanism.scene.policy import PolicySource
 from proofroll.elements.mechanism.scene.rotations import from_quaternion
 from proofroll.elements.mechanism.scene.signal import value_at
-from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
 from proofroll.robots.files.feet import GROUNDS, NO_FLOOR, NO_GROUND, OF_FILE, StandingRobot, ground_tables
 from proofroll.robots.files.robot_file import RobotFile
@@ -206,7 +205,8 @@ class ControlledScenes:
             followers = {mimic.joint for mimic in robot.mimics} if values.get("couplings") else set()
             single = [joint.name for joint in robot.moving if joint.dofs == 1 and joint.name not in followers]
             of_file = _servos_of_file(robot)
-            controller.require_joints(single, {joint.name: joint.kind for joint in robot.moving}, _positions(of_file))
+            positions = {name for name, row in of_file.items() if row["kind"] == "position"}
+            controller.require_joints(single, {joint.name: joint.kind for joint in robot.moving}, positions)
             actuators = _actuators(robot, controller, single, of_file, file.driven)
             names = [row["name"] for row in actuators]
             if controller.policy is not None and not actuators:
@@ -401,10 +401,6 @@ def _actuators(
             | ({} if limit is None else {"limit": limit})
         )
     return rows
-
-
-def _positions(of_file: Mapping[str, Mapping[str, Any]]) -> set[str]:
-    return {name for name, row in of_file.items() if row["kind"] == "position"}
 
 
 def _servo(controller: Controller, of_file: Mapping[str, Mapping[str, Any]], joint: str) -> Gains | None:

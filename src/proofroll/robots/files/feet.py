@@ -370,7 +370,7 @@ def _shape(standing: StandingRobot, row: Mapping[str, Any]) -> _Shape:
 
 
 def _coordinates(start: RobotStates) -> dict[str, list[float]]:
-    """Joint -> coordinates of a start, as :func:`proofroll.robots.importers.mujoco_shapes.near_shapes` takes them."""
+    """Joint -> coordinates of a start, as :func:`proofroll.robots.importers.mujoco_model.near_shapes` takes them."""
     rows: dict[str, list[float]] = {name: values[:1].tolist() for name, values in start.angle.items()}
     for name, matrices in start.rotation.items():
         turned = to_quaternion(matrices[0]).tolist()

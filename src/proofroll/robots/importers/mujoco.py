@@ -12,8 +12,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.scene.joint_kinds import ONE_COORDINATE, JointKind
 from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_quaternion
 from proofroll.engines.mujoco.running import mass_matrix, written
-from proofroll.robots.importers.mujoco_actuators import actuators_of, is_off, reflected
-from proofroll.robots.importers.mujoco_shapes import near_shapes
+from proofroll.robots.importers.mujoco_model import actuators_of, is_off, near_shapes, reflected
 from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotBody, RobotJoint, RobotLoop, Tie, composed
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
@@ -61,7 +60,7 @@ class MujocoRobots:
         return written(spec)
 
     def near_shapes(self, path: Path, **asked: Any) -> dict[str, Any]:
-        """See :func:`proofroll.robots.importers.mujoco_shapes.near_shapes`."""
+        """See :func:`proofroll.robots.importers.mujoco_model.near_shapes`."""
         return near_shapes(path, **asked)
 
     def as_written(self, request: Request) -> Whole:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.mechanism.run.element import MechanismElement
@@ -123,6 +122,7 @@ def _pieces(element: MechanismElement, ball: RollingBall, motion: BallMotion, ti
 
 def _orientation(w: FloatArray, pace: FloatArray) -> FloatArray:
     """Rotation matrices from the start of each piece on, by collocation at its points; w (pieces, points, 3)."""
+    from scipy.spatial.transform import Rotation  # half a second, which truths of other scenes do not need
     pieces, points, _ = w.shape
     x, y, z = np.moveaxis(w, -1, 0)
     zero = np.zeros_like(x)

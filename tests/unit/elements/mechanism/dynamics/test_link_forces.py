@@ -5,6 +5,7 @@ from typing import Any
 import mechanism_runs as runs
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_simpson
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
@@ -106,3 +107,12 @@ def test_a_run_sums_its_work_with_the_error_of_that() -> None:
     work, error = sampled_works(TIMES, power)
     apart = np.abs(work[:, 0] - (1.0 - np.cos(20.0 * TIMES)) / 20.0).max()
     assert apart < error[0] < 1e-2
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 7, 40])
+def test_work_over_samples_is_that_of_scipy(count: int) -> None:
+    """Simpson's rule without scipy, whose import is slow, has scipy's numbers at any number and spacing of samples."""
+    random = np.random.default_rng(count)
+    times, power = np.cumsum(random.uniform(0.1, 1.0, count)), random.normal(size=(count, 3))
+    expected = cumulative_simpson(power, x=times, axis=0, initial=0.0) if count > 1 else np.zeros((1, 3))
+    np.testing.assert_allclose(sampled_works(times, power)[0], expected, rtol=1e-13, atol=1e-13)
