@@ -110,8 +110,7 @@ def _first_parts(steps: FloatArray, values: FloatArray) -> FloatArray:
     first, second = steps[:-1], steps[1:]
     share = first / (first + second)
     bend = share * (first / second)
-    weighted = (3 - share) * values[:-2] + (3 + bend + share) * values[1:-1] - bend * values[2:]
-    return np.asarray(first / 6 * weighted)
+    return np.asarray(first / 6 * ((3 - share) * values[:-2] + (3 + bend + share) * values[1:-1] - bend * values[2:]))
 
 
 def put_links(

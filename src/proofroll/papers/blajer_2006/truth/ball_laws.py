@@ -123,6 +123,7 @@ def _pieces(element: MechanismElement, ball: RollingBall, motion: BallMotion, ti
 def _orientation(w: FloatArray, pace: FloatArray) -> FloatArray:
     """Rotation matrices from the start of each piece on, by collocation at its points; w (pieces, points, 3)."""
     from scipy.spatial.transform import Rotation  # half a second, which truths of other scenes do not need
+
     pieces, points, _ = w.shape
     x, y, z = np.moveaxis(w, -1, 0)
     zero = np.zeros_like(x)
