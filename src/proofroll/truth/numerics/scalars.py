@@ -47,13 +47,19 @@ def sub(a: Scalar, b: Scalar) -> Scalar:
 
 
 def dot(a: Vector, b: Vector) -> Scalar:
-    """Scalar product a·b."""
-    return add(*map(mul, a, b))
+    """Scalar product a·b in space."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    if type(ax) is type(ay) is type(az) is type(bx) is type(by) is type(bz) is float:
+        return 0.0 + ax * bx + ay * by + az * bz
+    return add(mul(ax, bx), mul(ay, by), mul(az, bz))
 
 
 def cross(a: Vector, b: Vector) -> list[Scalar]:
     """Vector product a×b."""
-    return [sub(mul(a[i], b[j]), mul(a[j], b[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
+    (ax, ay, az), (bx, by, bz) = a, b
+    if type(ax) is type(ay) is type(az) is type(bx) is type(by) is type(bz) is float:
+        return [ay * bz - az * by + 0.0, az * bx - ax * bz + 0.0, ax * by - ay * bx + 0.0]
+    return [sub(mul(ay, bz), mul(az, by)), sub(mul(az, bx), mul(ax, bz)), sub(mul(ax, by), mul(ay, bx))]
 
 
 def plus(*vectors: Vector) -> list[Scalar]:
