@@ -62,7 +62,7 @@ def answer_steps(
         engines = [*engines, engine]
         others = ", ".join(own_options.others)
         further = [f"Not compared, as the adapter has its own: {others}."] if others else []
-    paths = {engine: answer_path(out, whole, asked, [f"step of {engine}"]) for engine in engines}
+    paths = {engine: answer_path(out, whole, asked, [engine], caps=()) for engine in engines}
     answers = {engine: None if runner.fresh else stored(path, StepAnswer) for engine, path in paths.items()}
     facts = {engine: engine_facts(engine, whole, runner) for engine, answer in answers.items() if answer is None}
     for engine, pair in facts.items():

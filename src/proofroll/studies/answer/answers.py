@@ -14,6 +14,7 @@ from proofroll.core.plugins import EngineSpec, parse_engine
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status
 from proofroll.running.engine_questions import on_scene, resolve_with_truth
+from proofroll.running.identity import libraries
 from proofroll.running.process import processor_seconds
 from proofroll.running.profile import TIMING
 from proofroll.running.runner import Runner
@@ -289,11 +290,16 @@ def _step_tried(item: SettingSearch, divisor: int) -> StepTried | None:
 
 
 def answer_path(
-    folder: Path, question: AnswerQuestion, asked: AskedTolerance, engines: Sequence[str] = (), caps: SearchCaps = WHOLE
-) -> Path:
-    """File of an answer below the folder of results."""
+    folder: Path, question: AnswerQuestion, asked: AskedTolerance, engines: Sequence[str] = (),
+    caps: Sequence[float] = WHOLE,
+) -> Path:  # fmt: skip
+    """File of an answer below the folder of results: another one when an engine's program changes.
+
+    ``caps``: of the search; none where only the engines' own steps are judged.
+    """
+    programs = [libraries(parse_engine(name).name) for name in sorted(engines)]
     bounds = {name: [bound.value, bound.relative] for name, bound in asked.bounds.items()}
-    content = [question.loaded.digest, question.until, question.every, bounds, sorted(engines), *caps]
+    content = [question.loaded.digest, question.until, question.every, bounds, sorted(engines), programs, *caps]
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
     return folder / "answers" / f"{question.loaded.name}-{digest}.json"
 

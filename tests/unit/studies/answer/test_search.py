@@ -160,6 +160,22 @@ def test_a_step_that_is_asked_about_has_samples_at_its_double() -> None:
         whole.sampled_for(2.0)
 
 
+def test_a_changed_program_has_answers_of_its_own(tmp_path: Path) -> None:
+    """Answers about an engine that is a program are stored by its content, both of a search and of its own step."""
+    program = tmp_path / "rod"
+    question = AnswerQuestion.of("pendulum", {}, 1.0)
+    asked = AskedTolerance.of(["1e-4"], question.loaded)
+    paths = []
+    for content in ("first", "second", "first"):
+        program.write_text(content)
+        program.chmod(0o755)
+        engine = f"rod@program:{program}"
+        paths += [answer_path(tmp_path, question, asked, [engine])]
+        paths += [answer_path(tmp_path, question, asked, [f"{engine}[dt=0.002]"], caps=())]
+    assert len(set(paths)) == 4
+    assert paths[:2] == paths[4:]
+
+
 @pytest.mark.drill
 def test_an_answer_is_true_of_the_engine_and_is_stored(tmp_path: Path) -> None:
     """What is advised holds in a run of its own with other samples; the stored answer is the one that was made."""
