@@ -48,6 +48,7 @@ def answer_steps(
     from proofroll.studies.answer.own_step import engine_facts, step_answer
     from proofroll.studies.answer.question import question_named
     from proofroll.studies.answer.records import StepAnswer
+    from proofroll.studies.answer.setting_search import UNSEARCHED
     from proofroll.studies.comparison.default_comparison import own_engine
     from proofroll.studies.judging.asked_tolerance import DEFAULT, AskedTolerance
     from proofroll.studies.study_store import keep_study
@@ -62,7 +63,7 @@ def answer_steps(
         engines = [*engines, engine]
         others = ", ".join(own_options.others)
         further = [f"Not compared, as the adapter has its own: {others}."] if others else []
-    paths = {engine: answer_path(out, whole, asked, [engine], caps=()) for engine in engines}
+    paths = {engine: answer_path(out, whole, asked, [engine], UNSEARCHED) for engine in engines}
     answers = {engine: None if runner.fresh else stored(path, StepAnswer) for engine, path in paths.items()}
     facts = {engine: engine_facts(engine, whole, runner) for engine, answer in answers.items() if answer is None}
     for engine, pair in facts.items():

@@ -4,6 +4,7 @@ import ast
 import math
 import operator
 import re
+import warnings
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
@@ -42,7 +43,8 @@ def parsed_formula(text: str) -> ast.expr:
     source = text.replace("^", "**").strip()
     if len(text) > _LONGEST or not _CHARACTERS.fullmatch(text):
         raise FeatureNotAvailable(f"a formula has at most {_LONGEST} characters, each of which arithmetic needs")
-    tree = ast.parse(source, mode="eval").body
+    with warnings.catch_warnings(action="ignore", category=SyntaxWarning):  # "1if" warns, and is refused below
+        tree = ast.parse(source, mode="eval").body
     for node in ast.walk(tree):
         if not _is_arithmetic(node, source):
             raise FeatureNotAvailable(f"{type(node).__name__} is no arithmetic")

@@ -21,9 +21,9 @@ ELEMENTS = "proofroll.elements"
 _OF_AN_ENGINE = ("name", "provides", "settings", "presets", "version", "build")
 
 
-def engine_names() -> list[str]:
-    """Sorted names of all engines that installed packages announce."""
-    return sorted({point.name for point in announced(GROUP)})
+def engine_names(group: str = GROUP) -> list[str]:
+    """Sorted names of all engines that installed packages announce, or for which they announce a reader of robots."""
+    return sorted({point.name for point in announced(group)})
 
 
 def plain_name(name: str) -> str:

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from robot_gallery import locate, outcome, read_gallery
 
-from proofroll.core.plugins import parse_engine
+from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.robots.check.check import check
 from proofroll.robots.check.explain import RobotCause
 from proofroll.robots.check.records import HeldLayer, ImporterRow
 from proofroll.robots.files.meaning import CheckSettings
-from proofroll.robots.files.reading import reader_names
 from proofroll.robots.hypotheses import hypotheses
+from proofroll.robots.protocol import GROUP
 from proofroll.running.engine_questions import lent_workers
 
 
@@ -61,7 +61,7 @@ def test_all_as_expected() -> None:
             except pytest.skip.Exception:
                 continue
             checked += 1
-            engines = [name for name in entry.engines if parse_engine(name).name in reader_names()]
+            engines = [name for name in entry.engines if parse_engine(name).name in engine_names(GROUP)]
             for row in check(path, engines, CheckSettings(base=entry.base), workers=workers).engines:
                 if row.status != "missing" and set(outcome(row)) != set(entry.engines[row.engine]):
                     unexpected[entry.name, row.engine] = outcome(row)

@@ -90,6 +90,13 @@ def test_what_is_no_arithmetic_is_refused(text: str) -> None:
         assert "\n" not in str(caught.value)
 
 
+def test_python_warns_of_no_formula(recwarn: pytest.WarningsRecorder) -> None:
+    """What Python's own parser only warns of is refused without its warnings."""
+    with pytest.raises(InputError):
+        evaluated("mass", "1if 1else 2", {})
+    assert not recwarn.list
+
+
 @pytest.mark.parametrize(
     ("text", "value"), [("1e-3*2.", 2e-3), (".5^2", 0.25), ("-(+2)**3", -8.0), ("max(1,\n 2E0)", 2.0), ("9" * 20, 1e20)]
 )

@@ -85,16 +85,21 @@ def preset_words(preset: str) -> str:
 def installed_words(item: EngineAnswer) -> str:
     """Clause on the settings as installed beside the best ones; empty if the answer is of these, or none was tried.
 
-    The search leaves a setting that cannot be cheaper, so that a step of it that holds may not be confirmed.
+    A search that cannot be cheaper ends, so a step may not be confirmed; one with a finer step that fails is luck.
     """
     if not item.holds or item.preset == "default":
         return ""
     tried = [setting for setting in item.settings if parse_engine(setting.spec).options.get("preset") == "default"]
-    held = [(setting, run) for setting in tried for run in setting.steps if run.holds and run.seconds_per_second]
+    held, failed = [], []
+    for setting in tried:
+        wrong = [run for run in setting.steps if run.of_allowed is not None and not run.holds]
+        finest = min((run.step for run in wrong), default=math.inf)
+        held += [(setting, run) for run in setting.steps if run.holds and run.seconds_per_second and run.step < finest]
+        failed += [(setting, run) for run in wrong]
     if held:
         setting, run = min(held, key=lambda pair: pair[1].seconds_per_second or math.inf)
-        return f"{INSTALLED}: {_at(item, setting, run)}: {speed(run.seconds_per_second)}"
-    failed = [(setting, run) for setting in tried for run in setting.steps if run.of_allowed is not None]
+        unsure = "" if setting.state is State.HOLDS else ", not confirmed"
+        return f"{INSTALLED}: {_at(item, setting, run)}: {speed(run.seconds_per_second)}{unsure}"
     if failed:
         setting, run = min(failed, key=lambda pair: pair[1].of_allowed or math.inf)
         told = f"{_at(item, setting, run)} is off by {number(run.of_allowed)} times what is allowed"
@@ -148,18 +153,13 @@ def coarser_words(item: EngineAnswer) -> str:
     if tried is None:
         return ""
     double = "twice the step" if item.resolution == "dt" else "ten times the tolerance"
+    if tried.status == Status.TIMEOUT:
+        return f"{double} takes too long"
     if tried.status != Status.DONE:
-        return f"{double} {ended_words(tried)}"
+        return f"{double} ends at {number(tried.reached, 3)} s" if tried.reached else f"{double} gives no result"
     if tried.of_allowed is None or tried.of_allowed <= 1:
         return ""
     return f"{double} is off by {number(tried.of_allowed)} times what is allowed"
-
-
-def ended_words(tried: StepTried) -> str:
-    """Clause on a run that failed: ``ends at 1.35 s``."""
-    if tried.status == Status.TIMEOUT:
-        return "takes too long"
-    return f"ends at {number(tried.reached, 3)} s" if tried.reached else "gives no result"
 
 
 def taken_sentence(made: SceneAnswer) -> str:
@@ -183,19 +183,16 @@ def taken_sentence(made: SceneAnswer) -> str:
 
 def tolerance_words(made: SceneAnswer) -> str:
     """The tolerance for a reader: a part is one of the path."""
-    return f"{made.tolerance} of the path" if _is_number(made.tolerance) else made.tolerance
+    try:
+        float(made.tolerance)
+    except ValueError:
+        return made.tolerance
+    return f"{made.tolerance} of the path"
 
 
 def parameter_words(made: SceneAnswer) -> list[str]:
     """Parameters of the scene that were given, for a reader: ``speed 4``."""
     return [f"{symbol(name)} {number(value)}" for name, value in made.parameters.items()]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
 
 
 def unaided(made: SceneAnswer) -> EngineAnswer | None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from proofroll.core.errors import InputError, Missing, require_known
-from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
+from proofroll.core.plugins import EngineSpec, engine_names, parse_engine, place_of, plain_name
 from proofroll.files.toml import read_toml
 from proofroll.robots.check.body_recursion import body_recursion, poses
 from proofroll.robots.check.importer_row import importer_row, row_with_copy
@@ -26,7 +26,7 @@ from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.urdf import BASE_JOINT
 from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.model import RobotJoint
-from proofroll.robots.protocol import Request
+from proofroll.robots.protocol import GROUP, Request
 from proofroll.robots.states import RobotStates, random_states
 from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
@@ -57,7 +57,7 @@ def check(
     """
     accepted = _accepted(path, accept)
     asked = []
-    for spec in map(parse_engine, engines or reading.reader_names()):
+    for spec in map(parse_engine, engines or engine_names(GROUP)):
         if not place_of(spec.name):
             reading.require_reader(spec.name)
         asked.append((spec, reading.options_of(spec.options, spec.name)))

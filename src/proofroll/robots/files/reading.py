@@ -13,7 +13,7 @@ import numpy as np
 
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, Refused, require_known
-from proofroll.core.plugins import KNOWN_TITLES, plain_name
+from proofroll.core.plugins import KNOWN_TITLES, engine_names, plain_name
 from proofroll.files.json_data import plain
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.model import Cord, Mimic, Robot, RobotActuator, RobotBody, RobotJoint, RobotLoop, Tie
@@ -28,14 +28,9 @@ _OF_A_READER = (AttributeError, TypeError, NameError, LookupError, ImportError)
 _ARRAYS = ("M", "g", "h", "inverse", "forward")
 
 
-def reader_names() -> list[str]:
-    """Engines for which an installed package announces a reader, sorted."""
-    return sorted({point.name for point in announced(GROUP)})
-
-
 def require_reader(name: str) -> None:
     """Raises InputError if no installed package announces a reader for this engine."""
-    require_known("engine", name, reader_names(), "it reads no robot files; choose one of")
+    require_known("engine", name, engine_names(GROUP), "it reads no robot files; choose one of")
 
 
 def load_reader(name: str) -> Any:

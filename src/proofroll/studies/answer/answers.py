@@ -290,13 +290,9 @@ def _step_tried(item: SettingSearch, divisor: int) -> StepTried | None:
 
 
 def answer_path(
-    folder: Path, question: AnswerQuestion, asked: AskedTolerance, engines: Sequence[str] = (),
-    caps: Sequence[float] = WHOLE,
-) -> Path:  # fmt: skip
-    """File of an answer below the folder of results: another one when an engine's program changes.
-
-    ``caps``: of the search; none where only the engines' own steps are judged.
-    """
+    folder: Path, question: AnswerQuestion, asked: AskedTolerance, engines: Sequence[str] = (), caps: SearchCaps = WHOLE
+) -> Path:
+    """File of an answer below the folder of results; another one when the program of an engine has changed."""
     programs = [libraries(parse_engine(name).name) for name in sorted(engines)]
     bounds = {name: [bound.value, bound.relative] for name, bound in asked.bounds.items()}
     content = [question.loaded.digest, question.until, question.every, bounds, sorted(engines), programs, *caps]

@@ -42,8 +42,16 @@ def test_settings_are_told_in_two_words() -> None:
     """Beside the best settings stand those as installed: their cheapest step that holds, or how far off they are."""
     runs = [StepTried(2e-3, "done", 4.0, 2.0, 0.5, 1e-2), StepTried(5e-4, "done", 0.8, 2.0, 2.0, 4e-2)]
     tried = SettingTried("alpha[formulation=rough,preset=default]", State.DEARER, "", runs, "dt")
-    assert installed_words(replace(HELD, settings=[tried])) == "as installed: rough, dt 5e-4 s: 25×"
-    assert sentence(replace(HELD, settings=[tried]), 2.0).endswith("; as installed: rough, dt 5e-4 s: 25×.")
+    assert installed_words(replace(HELD, settings=[tried])) == "as installed: rough, dt 5e-4 s: 25×, not confirmed"
+    assert sentence(replace(HELD, settings=[tried]), 2.0).endswith(
+        "; as installed: rough, dt 5e-4 s: 25×, not confirmed."
+    )
+    sure = replace(tried, state=State.HOLDS)
+    assert installed_words(replace(HELD, settings=[sure])) == "as installed: rough, dt 5e-4 s: 25×"
+    lucky = replace(tried, steps=[*runs, StepTried(2.5e-4, "done", 1.1, 2.0, 1.0, 8e-2)])
+    assert installed_words(replace(HELD, settings=[lucky])) == (
+        "as installed: dearer (rough, dt 2.5e-4 s is off by 1.1 times what is allowed)"
+    )
     off = replace(tried, steps=runs[:1])
     assert installed_words(replace(HELD, settings=[off])) == (
         "as installed: dearer (rough, dt 2e-3 s is off by 4 times what is allowed)"

@@ -27,7 +27,7 @@ from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion, sampling_of
 from proofroll.studies.answer.records import AllowedError, SceneAnswer
 from proofroll.studies.answer.search import EngineSearch, SearchesAbreast, searching
-from proofroll.studies.answer.setting_search import SettingSearch, State
+from proofroll.studies.answer.setting_search import UNSEARCHED, SettingSearch, State
 from proofroll.studies.judging.asked_tolerance import AskedTolerance
 
 QUESTION = AnswerQuestion("double_pendulum", {}, 10.0, 0.1)
@@ -171,7 +171,7 @@ def test_a_changed_program_has_answers_of_its_own(tmp_path: Path) -> None:
         program.chmod(0o755)
         engine = f"rod@program:{program}"
         paths += [answer_path(tmp_path, question, asked, [engine])]
-        paths += [answer_path(tmp_path, question, asked, [f"{engine}[dt=0.002]"], caps=())]
+        paths += [answer_path(tmp_path, question, asked, [f"{engine}[dt=0.002]"], UNSEARCHED)]
     assert len(set(paths)) == 4
     assert paths[:2] == paths[4:]
 

@@ -18,11 +18,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from proofroll.core.errors import InputError, Missing, Refused
+from proofroll.core.plugins import engine_names
 from proofroll.files.atomic import replacing
 from proofroll.files.json_data import plain
-from proofroll.robots.files.reading import call, load_reader, reader_names, robot_from, words_of
+from proofroll.robots.files.reading import call, load_reader, robot_from, words_of
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.model import Robot
+from proofroll.robots.protocol import GROUP
 from proofroll.running.idle_workers import Workers
 
 # Environment variable with the folder of answers, which processes inherit from the one that began the command.
@@ -77,7 +79,7 @@ def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, A
 
     The reason is ``uncovered`` (the check does not cover something in the file) or ``message``.
     """
-    for name in reader_names():
+    for name in engine_names(GROUP):
         try:
             reader = load_reader(name)
         except Missing:
