@@ -361,25 +361,25 @@ class SettingSearch:
 
     def _next_check(self, good: int) -> tuple[int | None, str]:
         """Divisor of a check that is still to be made of a level that holds, or the fault that its checks show."""
-        if not self.fixed_step or self.given is not None:
+        if self.given is not None or good == self._last:
             return None, ""
         check, fault = self._order_check(good)
-        return (check, fault) if check is not None or fault else self._breakdown_check(good)
+        return (check, fault) if check is not None or fault or not self.fixed_step else self._breakdown_check(good)
 
     def _order_check(self, good: int) -> tuple[int | None, str]:
         """Check of a step that is no half, where errors do not fall in order; see :meth:`_next_check`."""
         divisor = self.divisor(good)
-        size, half = self.size(divisor), self.size(2 * divisor)
-        irregular = size < _REGULAR * half or bool(self.unsafe)
-        if not irregular and (size <= 1 / _MARGIN or self.order > 1):
+        sizes = [self.size(divisor), self.size(self.base * divisor)]
+        irregular = sizes[0] < _REGULAR * sizes[1] or bool(self.unsafe)
+        if not irregular and (sizes[0] <= 1 / _MARGIN or self.order > 1):
             return None, ""
         uneven, fault = self._uneven_check(good)
         if uneven is not None or fault:
             return uneven, fault
-        between = self.size(self._uneven(good))
-        if irregular and max(size, half, between) > 1 / _MARGIN:
-            lucky = number(self.step(divisor), 3)
-            fault = f"from dt {lucky} s on errors do not fall in order, with less than a factor of {_MARGIN:g}"
+        if self.fixed_step:
+            sizes.append(self.size(self._uneven(good)))
+        if irregular and max(sizes) > 1 / _MARGIN:
+            fault = f"from {self._at(good)} on errors do not fall in order, with less than a factor of {_MARGIN:g}"
         return None, fault
 
     def _uneven(self, good: int) -> int:

@@ -193,6 +193,16 @@ def test_an_adaptive_scheme_is_confirmed_by_a_tighter_tolerance() -> None:
     assert 1e-6 in {run.step for run in item.runs.values()}
 
 
+def test_tolerances_whose_errors_do_not_fall_need_a_margin() -> None:
+    """A tolerance that holds barely, as its tenth does, is not advised; with other samples it need not hold."""
+    lucky = {1e-3: 6.8e-2, 1e-4: 1.1e-2, 1e-5: 5.3e-3, 1e-6: 5.3e-5, 1e-7: 4.6e-5}
+    item = searched(setting(0, resolution="rtol"), lambda rtol: lucky.get(float(f"{rtol:.6g}"), 1e-6), 1e-9)
+    assert item.state is State.HOLDS
+    assert item.chosen is not None
+    assert item.chosen.step == pytest.approx(1e-7)
+    assert "from rtol 1e-6 on errors do not fall in order" in "".join(item.unsafe.values())
+
+
 def test_the_least_cost_is_a_bound() -> None:
     """What a setting can still cost is never more than what its advised step costs in the end."""
     for start in (0, 3, 9):
