@@ -12,7 +12,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.events import EVENT_ORDER
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.contact.coulomb import largest_friction
-from proofroll.elements.mechanism.contact.touching import Moving, touch
+from proofroll.elements.mechanism.contact.touching import AT_REST, Moving, touch
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.shapes.geometry import (
     carried_bodies,
@@ -70,26 +70,32 @@ class Followed(NamedTuple):
     place: FloatArray
 
 
+# Of the last mechanism, state of its bodies -> what :func:`follow_contacts` found there: events and columns of one run
+# are made from the same samples.
+_FOLLOWED: list[tuple[Mechanism, dict[bytes, FloatArray]]] = []
+
+
 def follow_contacts(placed: Placed) -> Followed:
     """Gaps, slip speeds, normals, sliding velocities and places of all contacts at all times."""
-    mechanism = placed.mechanism
-    shape = (len(placed.time), len(mechanism.contacts))
-    gap, slip = np.zeros(shape), np.zeros(shape)
-    normal, slide, place = (np.zeros((*shape, 3)) for _ in range(3))
-    rest = np.zeros((len(placed.time), 3))
-
-    def moving(body: str, k: int) -> Moving:
-        i = mechanism.body_index[body]
-        p, v, w = (rest if i < 0 else values[:, i] for values in (placed.p_WB, placed.v_WB, placed.w_WB))
-        return Moving(p[k], placed.R_WB[k, i], v[k], w[k])
-
-    for c, contact in enumerate(mechanism.contacts):
-        for k in range(shape[0]):
-            touching = touch(contact, moving(contact.body_a, k), moving(contact.body_b, k))
+    mechanism, index, count = placed.mechanism, placed.mechanism.body_index, len(placed.time)
+    motion = placed.p_WB, placed.R_WB[:, :-1], placed.v_WB, placed.w_WB
+    states = np.concatenate([values.reshape(count, -1) for values in motion], axis=1)
+    known = next((rows for last, rows in _FOLLOWED if last is mechanism), {})
+    values = np.zeros((count, len(mechanism.contacts), 11))
+    keys = [state.tobytes() for state in states]
+    for k, key in enumerate(keys):
+        if key in known:
+            values[k] = known[key]
+            continue
+        bodies = [*map(Moving, *(fields[k] for fields in motion)), AT_REST]
+        for c, contact in enumerate(mechanism.contacts):
+            touching = touch(contact, bodies[index[contact.body_a]], bodies[index[contact.body_b]])
             across = touching.slide - touching.normal * (touching.normal @ touching.slide)
-            gap[k, c], slip[k, c], normal[k, c] = touching.gap, np.linalg.norm(across), touching.normal
-            slide[k, c], place[k, c] = touching.slide, touching.place
-    return Followed(gap=gap, slip=slip, normal=normal, slide=slide, place=place)
+            vectors = touching.normal, touching.slide, touching.place
+            values[k, c] = touching.gap, np.linalg.norm(across), *np.concatenate(vectors).tolist()
+    _FOLLOWED[:] = [(mechanism, dict(zip(keys, values, strict=True)))]
+    gap, slip, *parts = np.split(values, [1, 2, 5, 8], axis=-1)
+    return Followed(gap[..., 0].copy(), slip[..., 0].copy(), *(part.copy() for part in parts))
 
 
 def moments_along(placed: Placed, place: FloatArray, pressed: FloatArray) -> FloatArray:
