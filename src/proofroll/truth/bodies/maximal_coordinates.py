@@ -6,10 +6,11 @@ DOP853 with projection: the rank is fixed at the start, and violations are elimi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from proofroll.elements.mechanism.dynamics.named_forces import joint_force_share
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
 from proofroll.elements.mechanism.scene.kinks import Functions
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.shapes.walls.formula import RecordedProgram, cos, sin
 from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.bodies.constraint_rows import ConstraintRow
 from proofroll.truth.bodies.maximal_bodies import BodyInScalars
@@ -110,13 +112,20 @@ class NumericEquations:
 
     def independence(self, rows: Sequence[int], state: Array) -> float:
         """Least singular value of some rows at a state, relative to that of all rows without the redundant ones."""
-        C = self._weighted(state)
+        C = self._recorded(state.tolist())[0] @ self._inverse_root
         whole, chosen = (np.linalg.svd(matrix, compute_uv=False) for matrix in (C, C[list(rows)]))
         return float(chosen[-1] / whole[self.rank - 1]) if self.rank else 1.0  # all rows may be round-off
 
+    @cached_property
+    def _recorded(self) -> Callable[[Sequence[float]], list[Array]]:
+        """Function of a state that gives its rows, recorded as plain assignments: they are asked for after each step."""
+        program = RecordedProgram(len(self.equations.start()))
+        rows = self.equations.lasting_rows(program.symbols, {**FUNCTIONS, "sin": sin, "cos": cos})
+        return program.arrays([self._matrix(rows, object)])
+
     def _weighted(self, state: Array) -> Array:
         """Rows at a state, with velocities weighted by inertia."""
-        return self._matrix(self.equations.at(state.tolist()).rows) @ self._inverse_root
+        return self._matrix(self.equations.lasting_rows(state.tolist())) @ self._inverse_root
 
     def solve(self, state: Array, time: float = 0.0, applied: Array | None = None) -> Solved:
         """Accelerations and multipliers at a time [s]; of dependent rows, the multipliers of least norm.
@@ -237,8 +246,8 @@ class NumericEquations:
             state = self.eliminated(state)
         return state
 
-    def _matrix(self, rows: Sequence[ConstraintRow]) -> Array:
-        C = np.zeros((len(rows), self.equations.nu))
+    def _matrix(self, rows: Sequence[ConstraintRow], kind: type = float) -> Array:
+        C = np.zeros((len(rows), self.equations.nu), dtype=kind)
         for number, row in enumerate(rows):
             for index, value in row.coefficients.items():
                 C[number, index] = value

@@ -186,7 +186,9 @@ class MaximalEquations:
             force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, NONE))
             rate += body.rate(x[at_x], u[at_u])
         made = self._rows(views)
-        rows: list[ConstraintRow] = []
+        rows = self._lasting(made, functions, time)
+        moved_rows = slice(len(rows) - len(self.mechanism.prescribed), len(rows))
+        coupled = slice(moved_rows.start - len(self.mechanism.couplings), moved_rows.start)
         laws, angle_rate = [], []
         efforts: list[Scalar] = [0.0] * len(self.mechanism.actuators)
 
@@ -201,7 +203,6 @@ class MaximalEquations:
             return add(drive, switched.push.get(number, 0.0), *own_parts)
 
         for number, connection in enumerate(self.connections):
-            rows += made.of(number)
             if number < len(self.mechanism.joints):
                 own_parts = [angle for angle, (k, _) in zip(angles, self.angles, strict=True) if k == number]
                 acts = bool(number in self._driving or number in switched.push)
@@ -209,10 +210,6 @@ class MaximalEquations:
                 laws.append(law)
                 angle_rate += rates
         self._add_point_loads(force, views, functions, time)
-        coupled = slice(len(rows), len(rows) + len(self.mechanism.couplings))
-        moved_rows = slice(coupled.stop, coupled.stop + len(self.mechanism.prescribed))
-        rows += [self._coupled(made, coupling) for coupling in self.mechanism.couplings]
-        rows += [self._prescribed(made, joint, time, functions) for joint, _, _ in self.mechanism.prescribed]
         rows += [made.of_rate(number, self.mechanism.joints[number].kind) for number in switched.held]
         drives = [
             Drive(made.of_rate(number, joint.kind), float(joint.armature))
@@ -254,6 +251,16 @@ class MaximalEquations:
 
     def _rows(self, views: Sequence[BodyInScalars]) -> ConstraintRows:
         return ConstraintRows(self.bodies, self.u_slices, self.connections, views)
+
+    def lasting_rows(self, state: Sequence[Scalar], functions: Mapping[str, Any] = FUNCTIONS) -> list[ConstraintRow]:
+        """Rows of :meth:`at` but for those of held joints, at time 0."""
+        return self._lasting(self._rows(self.views(state, functions)), functions, 0.0)
+
+    def _lasting(self, made: ConstraintRows, functions: Mapping[str, Any], time: Scalar) -> list[ConstraintRow]:
+        """Rows of connections, then of couplings, then of motions."""
+        rows = [row for number in range(len(self.connections)) for row in made.of(number)]
+        rows += [self._coupled(made, coupling) for coupling in self.mechanism.couplings]
+        return rows + [self._prescribed(made, joint, time, functions) for joint, _, _ in self.mechanism.prescribed]
 
     def _coupled(self, made: ConstraintRows, coupling: Coupling) -> ConstraintRow:
         """Row of a coupling between rates; the start satisfies it between coordinates, so the motion does, too."""
