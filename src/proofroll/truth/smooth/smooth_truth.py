@@ -135,6 +135,8 @@ class _SmoothTruth:
         units, early, form = self._units, EarlyEnd(), self._exact
         paths = followed(self._tree, self._bodies, self._until, (), smooth=True)
         early.at(*self._end_of(paths))
+        if form is not None and np.isfinite(early.time):
+            raise Diverged(early.reason, early.time)  # the closed form goes on
         growth, nearby = early.run(partial(self._nearby, paths[1]), self._times)
         count = len(growth)
         by_tree, by_bodies = self._by_tree(paths[0], count), self._by_bodies(paths[1], count)
