@@ -118,7 +118,7 @@ class EulerAngles(Orientation):
         self.renewals: list[float] = []
         self._renews = renews
         self._orientation_then = Rotation.identity()  # of the ball, when the present axes were chosen
-        self._axes_then = _body_axes(np.array([0.0, math.pi / 2, 0.0]))
+        self._back = _body_axes(np.array([0.0, math.pi / 2, 0.0])).inv()
 
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`Orientation`. θ = π/2 is farthest from the singularity."""
@@ -185,17 +185,17 @@ class EulerAngles(Orientation):
         w = _turning(self.pose(angles.tolist()), r.tolist())
         chosen = [0.0, math.pi / 2, math.atan2(w[0], -w[1])]
         self._orientation_then = self._orientation(angles)
-        self._axes_then = _body_axes(chosen)
+        self._back = _body_axes(chosen).inv()
         self.renewals.append(t)
         return np.array(chosen), np.array(_about_the_axes(self.pose(chosen), *w))
 
     @override
     def quaternion(self, angles: FloatArray) -> FloatArray:
-        return np.asarray(np.roll(self._orientation(angles).as_quat(), 1), dtype=np.float64)
+        return np.asarray(self._orientation(angles).as_quat(scalar_first=True), dtype=np.float64)
 
     def _orientation(self, angles: FloatArray) -> Rotation:
         """Orientation of the ball in the world, identity at time 0."""
-        return _body_axes(angles) * self._axes_then.inv() * self._orientation_then
+        return _body_axes(angles) * self._back * self._orientation_then
 
 
 def _turning(pose: tuple[float, ...], r: Sequence[float]) -> Vector:
