@@ -264,10 +264,11 @@ def _by_the_bodies(
     works: Array,
 ) -> Routed:
     """Motion and forces of the second route along a path with these states, as those of the first, without sums."""
-    acting = [bodies.acting(path.stretches[number], state) for number, state in zip(stretches, states, strict=True)]
-    modes = list(zip(states, acting, strict=True))
-    pressed, wrenches = zip(*(bodies.forces(state, mode) for state, mode in modes), strict=True)
-    switched = [bodies.equations.switched(state, mode) for state, mode in modes]
+    samples = []
+    for state, number in zip(states, stretches, strict=True):  # one after the other, for the last states are kept
+        mode = bodies.acting(path.stretches[number], state)
+        samples.append((*bodies.forces(state, mode), bodies.equations.switched(state, mode)))
+    pressed, wrenches, switched = zip(*samples, strict=True)
     record = second.recorded(times, states[:, :-1], switched, wrenches)
     return Routed(record, works, np.array(pressed) if bodies.equations.mechanism.contacts else None)
 
