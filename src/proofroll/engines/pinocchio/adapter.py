@@ -13,7 +13,6 @@ from proofroll.elements.mechanism.run.capabilities import MechanismCapability, r
 from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.pinocchio.contact import impulse_run
 from proofroll.engines.pinocchio.contact.impulse_run import ImpulseRun
-from proofroll.engines.pinocchio.own_lines import own_lines
 from proofroll.engines.pinocchio.settings import PRESETS, PinocchioSettings
 from proofroll.engines.pinocchio.smooth import constraint_dynamics, joint_tree
 from proofroll.engines.pinocchio.smooth.mechanism_run import MechanismRun
@@ -43,7 +42,7 @@ class Pinocchio:
         "impulses": impulse_run.LACKING,
     }
     settings: ClassVar[type[Any]] = PinocchioSettings
-    lines = staticmethod(own_lines)
+    lines = staticmethod(constraint_dynamics.own_lines)
     presets: ClassVar[Mapping[str, Mapping[str, PinocchioSettings]]] = PRESETS
     levels: ClassVar[Mapping[str, Level]] = {
         "null_space": Level.CONSTRAINT,

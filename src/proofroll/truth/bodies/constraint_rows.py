@@ -131,7 +131,6 @@ class ConstraintRows:
                 continue
             n: Sequence[Scalar] = AXES[k]  # along the world's axes
             on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(arm_a, n))
-            on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(arm_a, n))
             wrenches = ((n, on_b), (scaled(-1.0, n), on_a), (n, NONE))
             rows.append(self.row(number, dot(n, d), dot(n, towards), *wrenches))
         for k, m in facts.rotations:

@@ -118,14 +118,15 @@ class NumericEquations:
 
     @cached_property
     def _recorded(self) -> Callable[[Sequence[float]], list[Array]]:
-        """Function of a state that gives its rows, recorded as plain assignments: they are asked for after each step."""
-        program = RecordedProgram(len(self.equations.start()))
-        rows = self.equations.lasting_rows(program.symbols, {**FUNCTIONS, "sin": sin, "cos": cos})
+        """Function of a state that gives its rows, recorded as plain assignments, for they are asked for often."""
+        equations, functions = self.equations, {**FUNCTIONS, "sin": sin, "cos": cos}
+        program = RecordedProgram(len(equations.start()))
+        rows = equations.lasting_rows(equations.views(program.symbols, functions), functions)
         return program.arrays([self._matrix(rows, object)])
 
     def _weighted(self, state: Array) -> Array:
         """Rows at a state, with velocities weighted by inertia."""
-        return self._matrix(self.equations.lasting_rows(state.tolist())) @ self._inverse_root
+        return self._matrix(self.equations.lasting_rows(self.equations.views(state.tolist()))) @ self._inverse_root
 
     def solve(self, state: Array, time: float = 0.0, applied: Array | None = None) -> Solved:
         """Accelerations and multipliers at a time [s]; of dependent rows, the multipliers of least norm.

@@ -186,7 +186,7 @@ class MaximalEquations:
             force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, NONE))
             rate += body.rate(x[at_x], u[at_u])
         made = self._rows(views)
-        rows = self._lasting(made, functions, time)
+        rows = self.lasting_rows(views, functions, time)
         moved_rows = slice(len(rows) - len(self.mechanism.prescribed), len(rows))
         coupled = slice(moved_rows.start - len(self.mechanism.couplings), moved_rows.start)
         laws, angle_rate = [], []
@@ -252,12 +252,11 @@ class MaximalEquations:
     def _rows(self, views: Sequence[BodyInScalars]) -> ConstraintRows:
         return ConstraintRows(self.bodies, self.u_slices, self.connections, views)
 
-    def lasting_rows(self, state: Sequence[Scalar], functions: Mapping[str, Any] = FUNCTIONS) -> list[ConstraintRow]:
-        """Rows of :meth:`at` but for those of held joints, at time 0."""
-        return self._lasting(self._rows(self.views(state, functions)), functions, 0.0)
-
-    def _lasting(self, made: ConstraintRows, functions: Mapping[str, Any], time: Scalar) -> list[ConstraintRow]:
-        """Rows of connections, then of couplings, then of motions."""
+    def lasting_rows(
+        self, views: Sequence[BodyInScalars], functions: Mapping[str, Any] = FUNCTIONS, time: Scalar = 0.0
+    ) -> list[ConstraintRow]:
+        """Rows of connections, then of couplings, then of motions at a time [s], without those of held joints."""
+        made = self._rows(views)
         rows = [row for number in range(len(self.connections)) for row in made.of(number)]
         rows += [self._coupled(made, coupling) for coupling in self.mechanism.couplings]
         return rows + [self._prescribed(made, joint, time, functions) for joint, _, _ in self.mechanism.prescribed]

@@ -76,7 +76,8 @@ class PicardSteps:
         """
         scale = np.maximum(1.0, np.abs(state))[:, None]
         rates = self._rates(state[:, None])
-        length = self._length or _first_length(rates, scale)
+        # first some part of the time in which the state changes by its scale
+        length = self._length or 0.1 / max(float(np.max(np.abs(rates) / scale)), 1e-3)
         for _ in range(_TRIED):
             length = min(length, until - time)
             end = until if length == until - time else time + length
@@ -114,11 +115,6 @@ class PicardSteps:
                 break
             last_change, least = change, min(least, change)
         return values, np.inf, 0.5
-
-
-def _first_length(rates: FloatArray, scale: FloatArray) -> float:
-    """Length of a first step: some part of the time in which the state changes by its scale."""
-    return 0.1 / max(float(np.max(np.abs(rates) / scale)), 1e-3)
 
 
 def _left_out(sizes: FloatArray, count: int) -> tuple[float, float]:

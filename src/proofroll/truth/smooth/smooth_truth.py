@@ -139,7 +139,8 @@ class _SmoothTruth:
             raise Diverged(early.reason, early.time)  # the closed form goes on
         growth, nearby = early.run(partial(self._nearby, paths[1]), self._times)
         count = len(growth)
-        by_tree, by_bodies = self._by_tree(paths[0], count), self._by_bodies(paths[1], count)
+        times = self._times[:count]
+        by_tree, by_bodies = self._tree_at(paths[0], times), self._bodies_at(paths[1], times)
         by_bodies = on_same_turns(self._mechanism, by_tree, by_bodies)
         self._check_energy(by_tree, "joint coordinates", early, partial(self._tree_at, paths[0]))
         self._check_energy(by_bodies, "maximal coordinates", early, partial(self._bodies_beside, paths[1], by_tree))
@@ -232,18 +233,10 @@ class _SmoothTruth:
             return reason
         return BRANCHING if any(abs(time - end) <= 2 * step for time in poses) else reason
 
-    def _by_tree(self, path: FollowedPath, count: int) -> Record:
-        """Record of the first route at the first times."""
-        return self._tree_at(path, self._times[:count])
-
     def _tree_at(self, path: FollowedPath, times: Array) -> Record:
         """Record of the first route at rising times."""
         states = self._tree.within(path.stretches[0], times)
         return self._in_seconds(self._equations.recorded(times, states[:, :-1]))
-
-    def _by_bodies(self, path: FollowedPath, count: int) -> Record:
-        """Record of the second route at the first times."""
-        return self._bodies_at(path, self._times[:count])
 
     def _bodies_at(self, path: FollowedPath, times: Array) -> Record:
         """Record of the second route at rising times."""

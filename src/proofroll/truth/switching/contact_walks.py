@@ -158,7 +158,8 @@ class ContactWalks(ABC):
         excess = np.abs(equations.drawn(state)) - 1
         noise = np.where(np.abs(excess) < _CLAMPED, 2 * np.abs(excess), 0.0)
         if len(sides := np.array(signs[len(self._limited) :], dtype=float)):
-            noise = np.append(noise, noise_at_start(state, sides, equations.kinks, self._extent(state)))
+            farthest = float(np.abs(self.bodies(state)[0]).max(initial=1.0))  # at least the natural length
+            noise = np.append(noise, noise_at_start(state, sides, equations.kinks, farthest))
         of_guards = noise_of(guards, self._size)
         for number, value in enumerate(self._guards(state, mode, guards) if guards else ()):
             if guards[number].kind in {"lift", "break"} and abs(value) <= _NO_PRESSURE:
@@ -174,10 +175,6 @@ class ContactWalks(ABC):
     @abstractmethod
     def bodies(self, state: Array) -> BodyStates:
         """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
-
-    def _extent(self, state: Array) -> float:
-        """Largest distance of a body from the origin, at least the natural length, which is 1."""
-        return max(1.0, float(np.abs(self.bodies(state)[0]).max(initial=0.0)))
 
     def _held(self, signs: Sequence[int], value: Callable[[], _T]) -> _T:
         """A value while efforts at their limits and kinks keep their sides."""

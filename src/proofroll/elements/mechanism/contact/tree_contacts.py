@@ -66,6 +66,7 @@ from proofroll.elements.mechanism.scene.signal import FUNCTIONS
 # Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
 _NO_IMPULSE = 1e-4
 _ROUNDS = 2  # of the solution for forces: one, and one for its residual
+_KEPT = 512  # states whose kinematics are kept: paths that part late have most of their samples in common
 _ROUND_OFF = 1e-13  # of slides in a sequence of impacts, relative to the largest
 
 
@@ -114,7 +115,7 @@ class ContactDynamics:
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._held: tuple[int, ...] = ()
-        self._last = LastResults[tuple[bytes, bytes, float, tuple[object, ...], Features | None], ContactsNow](4)
+        self._last = LastResults[tuple[bytes, bytes, float, tuple[object, ...], Features | None], ContactsNow](_KEPT)
 
     def at(self, q: Array, v: Array, time: float = 0.0, features: Features | None = None) -> ContactsNow:
         """Kinematics and free accelerations for coordinates (nq) and velocities (nv) at a time [s].

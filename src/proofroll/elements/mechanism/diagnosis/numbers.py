@@ -369,7 +369,8 @@ def _of_bushing(bushing: Bushing) -> Iterator[tuple[str, Bushing, str]]:
     translation, rotation = bushing.stiffness[:3], bushing.stiffness[3:]
     if any(bushing.orientation_a):
         # B turns with A, or the bushing would be loaded at rest
-        along_body = replace(bushing, orientation_a=ZERO, orientation_b=_less(bushing))
+        at_rest = to_rpy(bushing.frame_b @ bushing.frame_a.T)
+        along_body = replace(bushing, orientation_a=ZERO, orientation_b=at_rest)
         says = f"acts along the axes of {bushing.body_a}, not of its frame there"
         yield says, along_body, f"turn its frame by its orientation in {bushing.body_a}"
     if any(rotation) and any(translation):
@@ -382,11 +383,6 @@ def _of_bushing(bushing: Bushing) -> Iterator[tuple[str, Bushing, str]]:
 def _ordered(values: Six, order: tuple[int, int, int]) -> Six:
     x, y, z = order
     return (values[x], values[y], values[z], values[3 + x], values[3 + y], values[3 + z])
-
-
-def _less(bushing: Bushing) -> tuple[float, float, float]:
-    """Orientation of B that keeps B at rest where A has the axes of body_a."""
-    return to_rpy(bushing.frame_b @ bushing.frame_a.T)
 
 
 @by_rows("applied force", _PROOF)

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Loop
 from proofroll.elements.mechanism.dynamics.loop_points import held_points
 from proofroll.elements.mechanism.run.capabilities import ALL_LOOPS, MechanismCapability
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.engines.pinocchio.settings import PinocchioSettings
 from proofroll.engines.pinocchio.smooth import joint_tree
 from proofroll.engines.pinocchio.smooth.joint_tree import JointTree
 
@@ -27,6 +29,10 @@ LACKING: Mapping[str, str] = {
 }
 # Of the proximal method.
 ITERATIONS, ACCURACY = 50, 1e-14
+_STEPS = {
+    "rk4": "# classical Runge-Kutta with dt = {0.dt!r} s; places by pin.integrate(model, q, v * dt)",
+    "dop853": "# scipy.integrate.DOP853 with rtol = {0.rtol!r}; places by the rates of q",
+}
 
 
 class ConstraintDynamics:
@@ -108,3 +114,24 @@ class ConstraintDynamics:
         pin.computeJointJacobians(self._model, data, q)
         J = pin.getConstraintsJacobian(self._model, data, self.constraints, self._results)
         return np.reshape(J, (-1, self._model.nv))
+
+
+def own_lines(settings: PinocchioSettings) -> list[str]:
+    """See :class:`proofroll.core.engine_abilities.TellsLines`: the acceleration, and how it is integrated.
+
+    Raises:
+        Refused: a formulation whose equations are proofroll's.
+    """
+    if settings.formulation != "constraint_dynamics":
+        raise Refused(f"the equations of {settings.formulation} are proofroll's, built of Pinocchio's terms")
+    return [
+        "data = model.createData()",
+        "results = pin.StdVec_RigidConstraintData()",
+        "for constraint in constraints:  # a pin.StdVec_RigidConstraintModel, one for each loop",
+        "    results.append(constraint.createData())",
+        f"proximal = pin.ProximalSettings({ACCURACY:g}, {settings.proximal:g}, {ITERATIONS})",
+        "pin.initConstraintDynamics(model, data, constraints, results)",
+        "a = pin.constraintDynamics(model, data, q, v, tau, constraints, results, proximal)",
+        _STEPS[settings.integrator].format(settings),
+        *(["# after each step: q and v back on the constraints"] if settings.projection else []),
+    ]

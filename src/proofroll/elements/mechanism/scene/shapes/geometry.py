@@ -117,7 +117,8 @@ class Geometry:
         for key in ("radius", "axes", "size", "slope", "ring_radius", "length", *usual):
             value, asked = getattr(self, key), key in _KEYS[self.kind]
             if not asked and value != usual.get(key):
-                raise InputError(f"{where}.{key}", value, f"{_a(self.kind)} has none; it has {_key_list(self.kind)}")
+                keys = " and ".join(_KEYS[self.kind])
+                raise InputError(f"{where}.{key}", value, f"{_a(self.kind)} has none; it has {keys}")
             if asked and value is None:
                 raise InputError(f"{where}.{key}", None, f"{_a(self.kind)} needs it; add it")
         if self.radius is not None:
@@ -494,7 +495,3 @@ def contact_moments(contacts: Sequence[BodyContact], centres: Sequence[Array], p
 
 def _a(kind: str) -> str:
     return f"an {kind}" if kind == "ellipsoid" else f"a {kind}"
-
-
-def _key_list(kind: str) -> str:
-    return " and ".join(_KEYS[kind])
