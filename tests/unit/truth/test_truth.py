@@ -95,7 +95,7 @@ def test_chosen_rows_that_become_dependent_are_exchanged(scene):
 
 def grown(route, path, times):
     """Stands for a motion that a small change of the start leads anywhere."""
-    return np.full(len(times), 1e12), route._by_bodies(path, len(times))
+    return np.full(len(times), 1e12), route._bodies_at(path, times)
 
 
 def wound_up():

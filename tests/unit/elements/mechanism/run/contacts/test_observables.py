@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mechanism_scenes import mechanism_named
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.truth import truth
-from proofroll.elements.mechanism.run.contacts.observables import RESIDUALS, Followed, residuals
+from proofroll.elements.mechanism.dynamics.placed import Placed
+from proofroll.elements.mechanism.run.contacts import observables
+from proofroll.elements.mechanism.run.contacts.observables import RESIDUALS, Followed, follow_contacts, residuals
 from proofroll.files.scene_file import load_scene
 
 MU = 0.5
@@ -87,3 +90,27 @@ def test_laws_that_no_impact_breaks_are_judged_where_they_hold(scene: str, passi
     names = {item.name for item in load_scene(scene).elements[0].observables}
     assert ("energy_gain" in names) == passive
     assert ({"momentum_error", "angular_momentum_error"} <= names) == closed
+
+
+def test_events_and_columns_of_a_run_see_each_contact_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """States that were followed before are not followed again, among others and with the other sign of quaternions."""
+    mechanism, rng, seen = mechanism_named("sled"), np.random.default_rng(0), 0
+    touch = observables.touch
+
+    def counted(*arguments: object) -> object:
+        nonlocal seen
+        seen += 1
+        return touch(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(observables, "touch", counted)
+    q = rng.normal(size=(6, 1, 4))
+    motion = [*rng.normal(size=(3, 6, 1, 3)), q / np.linalg.norm(q, axis=-1, keepdims=True)]
+    times = np.arange(6.0)
+    first = follow_contacts(Placed(mechanism, times[:4], *(values[:4] for values in motion)))
+    assert seen == 4 * 3
+    again = follow_contacts(Placed(mechanism, times, *motion[:3], -motion[3]))
+    assert seen == 6 * 3
+    assert all(np.array_equal(values[:4], before) for values, before in zip(again, first, strict=True))
+    other = mechanism_named("sled", friction=0.2)
+    follow_contacts(Placed(other, times, *motion))
+    assert seen == 12 * 3
