@@ -22,7 +22,7 @@ _OF_AN_ENGINE = ("name", "provides", "settings", "presets", "version", "build")
 
 
 def engine_names(group: str = GROUP) -> list[str]:
-    """Sorted names of all engines that installed packages announce, or for which they announce a reader of robots."""
+    """Sorted names of all engines that installed packages announce in a ``group`` of entry points."""
     return sorted({point.name for point in announced(group)})
 
 

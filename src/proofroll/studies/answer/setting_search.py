@@ -38,7 +38,7 @@ class SearchCaps(NamedTuple):
 WHOLE = SearchCaps()
 # Of the many searches of a report; for the longest `recommend` is there.
 BRIEF = SearchCaps(4.0, 12.0)
-UNSEARCHED = SearchCaps(0.0, 0.0)
+UNSEARCHED = SearchCaps(0.0, 0.0)  # of a question about one given step
 # Loosest relative tolerance of a scheme that adapts its steps; number of tighter ones, and the factor between two.
 LOOSEST, _TIGHTEST, _DECADE = 1e-3, 10, 10
 # Most halvings of the sampling interval.

@@ -1,6 +1,7 @@
 """Vector algebra over any scalars: floats, long doubles, expressions of heyoka.
 
-Plain float zeros and ones are folded away: terms that vanish by a mechanism's geometry are never formed.
+Plain float zeros and ones are folded away: terms that vanish by a mechanism's geometry are never formed. Vectors of
+plain floats are multiplied as they are; adding 0.0 leaves no negative zero, as folding leaves none.
 """
 
 from collections.abc import Sequence

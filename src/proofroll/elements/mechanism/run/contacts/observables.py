@@ -80,12 +80,12 @@ def follow_contacts(placed: Placed) -> Followed:
     mechanism, index, count = placed.mechanism, placed.mechanism.body_index, len(placed.time)
     motion = placed.p_WB, placed.R_WB[:, :-1], placed.v_WB, placed.w_WB
     states = np.concatenate([values.reshape(count, -1) for values in motion], axis=1)
-    known = next((rows for last, rows in _FOLLOWED if last is mechanism), {})
+    earlier_rows = next((rows for last, rows in _FOLLOWED if last is mechanism), {})
     values = np.zeros((count, len(mechanism.contacts), 11))
     keys = [state.tobytes() for state in states]
     for k, key in enumerate(keys):
-        if key in known:
-            values[k] = known[key]
+        if key in earlier_rows:
+            values[k] = earlier_rows[key]
             continue
         bodies = [*map(Moving, *(fields[k] for fields in motion)), AT_REST]
         for c, contact in enumerate(mechanism.contacts):
