@@ -53,6 +53,7 @@ class RunContent:
         omitted: clauses on what the file describes and the run leaves out; None: nothing.
         quiet: sentence on a run in which nothing moves, or nothing touches; None: something does.
         ends: time from which the truth is not known [s]; samples from there on are missing; None: none is.
+        processor_seconds: of the engine or the truth, which other processes do not lengthen [s]; None: unknown.
     """
 
     scene: str
@@ -82,6 +83,7 @@ class RunContent:
     event_table: str | None = field(default=None, metadata=OPTIONAL)
     bounces: list[Bounce] | None = field(default=None, metadata=OPTIONAL)
     ends: float | None = field(default=None, metadata=OPTIONAL)
+    processor_seconds: float | None = field(default=None, metadata=OPTIONAL)
     step_bound: str | None = field(default=None, metadata=OPTIONAL)
     omitted: list[str] | None = field(default=None, metadata=OPTIONAL)
     quiet: str | None = field(default=None, metadata=OPTIONAL)
@@ -103,6 +105,7 @@ def run_content(case: Case, result: Result, trajectory: Path, loaded: Scene | No
         until=case.until,
         every=case.every,
         wall_seconds=result.wall_seconds,
+        processor_seconds=result.processor.get("truth" if case.engine.name == "truth" else "advance"),
         build_seconds=result.build_seconds,
         versions=result.versions,
         certificate=result.certificate,
@@ -175,12 +178,13 @@ def _ended_words(content: RunContent, engine: str) -> str:
     resolution = [name for name in ("dt", "rtol") if settings.get(name) is not None][:1]
     steps = [step(name, settings[name]) for name in resolution]
     title = ", ".join(filter(None, (*words, *precision_words(content.precision), *steps)))
+    seconds = min(content.wall_seconds, content.processor_seconds or math.inf)
     if content.status != Status.DONE or content.engine == "truth":
-        return f"{title}: {content.message}; {number(content.wall_seconds)} s of computing"
-    speed = f" ({number(content.until / content.wall_seconds)}× real time)" if content.wall_seconds else ""
-    seconds = content.build_seconds or 0.0
-    build = f", after {number(seconds)} s before the first step" if seconds > _BUILD else ""
-    return f"{title} reached {content.until:g} s in {number(content.wall_seconds)} s{speed}{build}."
+        return f"{title}: {content.message}; {number(seconds)} s of computing"
+    speed = f" ({number(content.until / seconds)}× real time)" if seconds else ""
+    before = content.build_seconds or 0.0
+    build = f", after {number(before)} s before the first step" if before > _BUILD else ""
+    return f"{title} reached {content.until:g} s in {number(seconds)} s{speed}{build}."
 
 
 def _hidden_forces(content: RunContent) -> list[str]:

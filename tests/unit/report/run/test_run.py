@@ -81,6 +81,18 @@ def test_the_first_line_is_the_answer(seconds: float | None, said: str, tmp_path
     assert [str(lines[0]), str(lines[-1])] == [said, "is it right? a command"]
 
 
+@pytest.mark.parametrize(("engine", "activity"), [("mujoco", "advance"), ("truth", "truth")])
+def test_other_processes_make_no_run_dearer(engine: str, activity: str, tmp_path: Path) -> None:
+    """The computing that is told is processor time where that is shorter than what the clock shows."""
+    case = _case("pendulum")
+    case.engine.name = engine
+    result = Result(Status.DONE, "reached 1 s", wall_seconds=9.0, processor={activity: 0.25})
+    content = run_content(case, result, tmp_path / "none.npz")
+    lines = run_lines(dataclasses.replace(content, final={"time": 1.0}, units={"time": "s"}))
+    assert "0.25 s" in str(lines[0])
+    assert "9 s" not in str(lines[0])
+
+
 def test_an_event_says_to_what_it_happens(tmp_path: Path) -> None:
     """Of several contacts or joints the name stands with the kind; an event without a name has none."""
     result = Result(Status.DONE, "reached 1 s", wall_seconds=1.0)
