@@ -112,15 +112,26 @@ def _location(location: Iterable[str | int], content: Any) -> list[str]:
 def _first_problem(
     error: ValidationError, place: str, kind: type, content: Mapping[str, Any], keys: Iterable[str]
 ) -> InputError:
-    """Error for the first mistake that pydantic found."""
+    """Error for the first mistake that pydantic found, or for all keys that are missing."""
+
+    def is_absent(entry: Mapping[str, Any]) -> bool:
+        return entry["type"] in {"missing", "missing_argument"} and not isinstance(entry["loc"][-1], int)
+
+    def located(entry: Mapping[str, Any]) -> str:
+        return ".".join(_location(entry["loc"], content) + [str(part) for part in entry["loc"][-1:]] * is_absent(entry))
+
     # An unknown key goes before a missing one, as it may be the missing one misspelt.
     problem = min(error.errors(), key=lambda entry: entry["type"] not in _UNKNOWN)
-    absent = problem["type"] in {"missing", "missing_argument"} and not isinstance(problem["loc"][-1], int)
-    location = ".".join(_location(problem["loc"], content) + [str(part) for part in problem["loc"][-1:]] * absent)
+    location, absent = located(problem), is_absent(problem)
     if problem["type"] in _UNKNOWN:
         return no_such_key(f"{place}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], keys))
     if absent:
-        return InputError(f"{place}: {location}", None, "this key is required; add it")
+        # a type in the place of a key is one of several that the table might be, whose keys may be another's
+        plain = [
+            entry for entry in error.errors() if is_absent(entry) and located(entry) == ".".join(map(str, entry["loc"]))
+        ]
+        others = "".join(f", {name}" for name in map(located, plain) if name != location)
+        return InputError(f"{place}: {location}", None, f"this key is required; add it{others}")
     error_found = problem.get("ctx", {}).get("error")
     if isinstance(error_found, OutOfBounds):
         location = ".".join(filter(None, [location, error_found.field]))

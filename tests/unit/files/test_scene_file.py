@@ -50,6 +50,16 @@ def problem(name: str, **parameters: Any) -> InputError:
     return caught.value
 
 
+def test_all_keys_that_are_missing_are_told_at_once(tmp_path: Path) -> None:
+    """A file without several required keys is answered by all of them, not by one after another."""
+    text = 'title = "A body"\n[parameters.mass]\nvalue = 1.0\nunit = "kg"\n[[bodies]]\nname = "b"\nmass = "$mass"\n'
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    error = problem(str(tmp_path))
+    assert str(error).endswith(
+        "source is missing: this key is required; add it, gravity, parameters.mass.meaning, parameters.mass.source"
+    )
+
+
 def test_both_scenes_are_there() -> None:
     """The scenes are found by name."""
     assert scene_names() == sorted(scene_names())

@@ -13,7 +13,7 @@ import warp
 
 from proofroll.adapter import MechanismSample, MujocoArrays, Refused, Scene, mechanism_of, whole_steps
 from proofroll_mujoco_warp.settings import MujocoWarpSettings
-from proofroll_mujoco_warp.start import rows_of, start_of
+from proofroll_mujoco_warp.start import SeenData, rows_of, start_of
 
 # Arrays of a state at time 0 that scenes have with their own numbers.
 _KEYS = "key_"  # beginning of names of keyframes, which the start was read from
@@ -31,7 +31,8 @@ class MujocoWarpBatch:
         self._model = self._merged([mujoco_warp.put_model(model) for model, _ in starts])
         self._data = self._state([data for _, data in starts], host)
         mujoco_warp.step(self._model, self._data)  # compiles
-        self._data = self._state([data for _, data in starts], host)
+        self._data, scratch = (self._state([data for _, data in starts], host) for _ in range(2))
+        self._seen = SeenData(self._model, scratch)
         warp.synchronize()
 
     def _merged(self, records: Sequence[Any]) -> Any:
@@ -73,6 +74,4 @@ class MujocoWarpBatch:
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine_abilities.Batch`."""
-        for refresh in (mujoco_warp.kinematics, mujoco_warp.com_pos, mujoco_warp.com_vel):
-            refresh(self._model, self._data)
-        return self._arrays.sample(lambda name: getattr(self._data, name).numpy())
+        return self._arrays.sample(self._seen.of(self._data))

@@ -24,7 +24,7 @@ from proofroll.adapter import (
 )
 from proofroll_mujoco_warp.batch import MujocoWarpBatch
 from proofroll_mujoco_warp.settings import LACKING, PRESETS, PROVIDES, MujocoWarpSettings
-from proofroll_mujoco_warp.start import rows_of, start_of
+from proofroll_mujoco_warp.start import SeenData, rows_of, start_of
 
 warp.config.quiet = True
 
@@ -63,7 +63,8 @@ class MujocoWarp:
         self._arrays = MujocoArrays.of(self._mechanism, host)
         self._model, rows = mujoco_warp.put_model(host), rows_of(host)
         mujoco_warp.step(self._model, mujoco_warp.put_data(host, start, njmax=rows))  # compiles
-        self._data = mujoco_warp.put_data(host, start, njmax=rows)
+        self._data, scratch = (mujoco_warp.put_data(host, start, njmax=rows) for _ in range(2))
+        self._seen = SeenData(self._model, scratch)
         warp.synchronize()
 
     def drive(self, values: Iterable[float]) -> None:
@@ -84,9 +85,8 @@ class MujocoWarp:
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
-        for refresh in (mujoco_warp.kinematics, mujoco_warp.com_pos, mujoco_warp.com_vel):
-            refresh(self._model, self._data)
-        return self._arrays.sample(lambda name: _first(getattr(self._data, name)))
+        seen = self._seen.of(self._data)
+        return self._arrays.sample(lambda name: seen(name)[0])
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
