@@ -20,7 +20,7 @@ from proofroll.report.comparison.summary import _worst
 from proofroll.report.page.growing import begun
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.comparison.compare import evaluate, run_plan
+from proofroll.studies.comparison.compare import evaluate, run_plans
 from proofroll.studies.comparison.planning import plan
 
 
@@ -65,7 +65,7 @@ def test_nothing_is_loaded_again_after_judging(
     asked = Comparison("gone", "Gone", "Is it read?", str(scene), 0.2, 0.1, bands={"close": band}, rows=rows)
     runner = Runner(Store(tmp_path / "out" / "cases"), jobs=1)
     planned = plan(dataclasses.replace(asked, timed=False), workers=runner.workers)
-    results = run_plan(planned, runner)
+    (planned,), results = run_plans([planned], runner)
     counts: Counter[str] = Counter()
     for place, what in ((trajectory_file, "read"), (scene_file, "_read")):
         monkeypatch.setattr(place, what, counted(getattr(place, what), counts))

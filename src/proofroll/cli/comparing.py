@@ -179,7 +179,7 @@ def outcomes_of(
     """
     from proofroll.running.process import processor_seconds
     from proofroll.running.time_budget import TimeBudget
-    from proofroll.studies.comparison.compare import affordable, run_plan
+    from proofroll.studies.comparison.compare import affordable, run_within_budget
     from proofroll.studies.comparison.planning import plan
 
     begin = processor_seconds() - spent
@@ -201,10 +201,9 @@ def outcomes_of(
     running = _Comparing(plans, runner, limit, finished)
     try:
         with watched.screen(running) if watched else options.progress_bar(f"{stage}cases", total=len(owner)) as advance:
-            running.tell = lambda text: advance(f"{stage}{text}")
+            running.tell = lambda text: advance(f"{stage}{text}", total=len(running.keys))
             for item in plans:
-                if item.comparison.budget:
-                    running.results |= run_plan(item, runner, running.add)
+                running.results |= run_within_budget(item, runner, running.add)
             for phase in phases:
                 running.run(phase, last=phase is phases[-1])
     except KeyboardInterrupt:
@@ -230,6 +229,7 @@ class _Comparing:
 
     Attributes:
         tell: called with the bar's text after each case.
+        keys: of all cases that are run.
     """
 
     def __init__(
@@ -240,12 +240,12 @@ class _Comparing:
         finished: Callable[[dict[int, Outcome], bool], None] | None,
     ) -> None:
         self.plans, self.runner, self.limit, self.finished = plans, runner, limit, finished
+        self.keys = {case.key for item in plans for case in item.cases}
         self.tell: Callable[[str], None] = lambda _: None
         self.results: dict[str, Result] = {}
         self.ended: dict[int, Outcome] = {}
         self._judged: dict[int, int] = {}
         self._judging = 0.0
-        self._keys = list(dict.fromkeys(case.key for item in plans for case in item.cases))
         self._truths = {case.key for item in plans for case in item.truths.values()}
         self._start, self._reused = time.monotonic(), runner.reused
         self._budget = limit.left if limit else 0.0
@@ -255,7 +255,7 @@ class _Comparing:
         """Results by key; of cases that have not ended that they were left out."""
         from proofroll.running.case import Result, Status
 
-        return dict.fromkeys(self._keys, Result(Status.LEFT_OUT, "it has not been run yet")) | self.results
+        return dict.fromkeys(self.keys, Result(Status.LEFT_OUT, "it has not been run yet")) | self.results
 
     def judge(self, index: int) -> None:
         """Judges a comparison by the cases that have been run so far."""
@@ -291,6 +291,7 @@ class _Comparing:
         ``last``: True if no phase follows.
         """
         from proofroll.running.case import Status
+        from proofroll.studies.comparison.compare import settled
 
         priority, awaited = self._priorities(phase), self._awaited(phase)
         postponed: list[Case] = []
@@ -307,10 +308,20 @@ class _Comparing:
             else:
                 arrived(case, result)
 
-        cases = {case.key: case for _, items in phase for case in items if case.key not in self.results}
-        # Cases beyond their comparison's share are tried again with the time that the others left.
-        self.runner.run(cases.values(), arrived_first if self.limit else arrived, self.limit, priority)
-        self.runner.run(postponed, arrived, self.limit, priority)
+        def run(keys: set[str]) -> None:
+            wanted = keys - self.results.keys()
+            cases = {case.key: case for _, items in phase for case in items if case.key in wanted}
+            # Cases beyond their comparison's share are tried again with the time that the others left.
+            self.runner.run(cases.values(), arrived_first if self.limit else arrived, self.limit, priority)
+            self.runner.run(postponed, arrived, self.limit, priority)
+            postponed.clear()
+
+        run({case.key for item in self.plans for case in item.first_cases})
+        self.plans = [settled(item, self.results, self.runner) for item in self.plans]
+        self.keys = {case.key for item in self.plans for case in item.cases}
+        for _, keys in awaited:
+            keys.intersection_update(self.keys)
+        run(self.keys)
         self._judge_ended(awaited, last=last)
 
     def _priorities(self, phase: _Phase) -> dict[str, int]:
@@ -345,7 +356,7 @@ class _Comparing:
         """Updates the bar's text: comparisons that have ended, estimated time left, engine that ran."""
         # Reused results are counted before their cases arrive here, so the difference may be negative.
         many, ran = len(self.plans), max(0, len(self.results) - (self.runner.reused - self._reused))
-        left = (time.monotonic() - self._start) / ran * (len(self._keys) - len(self.results)) if ran else 0.0
+        left = (time.monotonic() - self._start) / ran * (len(self.keys) - len(self.results)) if ran else 0.0
         if self.limit and (used := self._budget - self.limit.left) > 0:
             # On a machine that does other things, too, processor time passes slower. The rest is judged in the end.
             left = min(left, (self.limit.left + self.limit.after) * (time.monotonic() - self._start) / used)
@@ -378,18 +389,16 @@ class _Watched:
         self._told: set[int] = set()
 
     @contextmanager
-    def screen(self, running: _Comparing) -> Iterator[Callable[[str], None]]:
+    def screen(self, running: _Comparing) -> Iterator[Callable[..., None]]:
         """Context manager with the rows and the line on standard error; yields a function that updates them."""
-        (planned,) = running.plans
-        keys = {case.key for case in planned.cases}
         texts = ["starting"]
 
         def line() -> str:
-            return f"{len(keys & running.results.keys())} of {len(keys)} runs, {texts[-1]}"
+            return f"{len(running.results)} of {len(running.keys)} runs, {texts[-1]}"
 
         with options.growing(lambda: self._lines, line, shown=self._moves) as moves:
 
-            def update(text: str) -> None:
+            def update(text: str, **_: int) -> None:
                 texts[:] = [text]
                 if moves:
                     self._add_rows(running)

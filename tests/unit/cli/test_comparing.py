@@ -179,7 +179,7 @@ def test_the_time_that_is_left_is_never_less_than_none() -> None:
     runner: Any = SimpleNamespace(reused=0, jobs=1)
     running = _Comparing([], runner, None, None)
     running.tell = said.append
-    running._keys = list("abcdefgh")
+    running.keys = set("abcdefgh")
     for running.runner.reused, running.results in ((6, {"a": None}), (6, dict.fromkeys("abcdefg"))):  # type: ignore[assignment]
         running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco", resolution=None, settings={})))  # type: ignore[arg-type]
     assert said[0] == "MuJoCo"
@@ -196,7 +196,7 @@ def test_a_spent_budget_leaves_the_time_to_judge() -> None:
     runner: Any = SimpleNamespace(reused=0, jobs=1)
     running = _Comparing([], runner, TimeBudget(100.0, spent=90.0), None)
     running.tell = said.append
-    running._keys, running.results, running._budget = list("abcdefgh"), {"a": None}, 90.0  # type: ignore[assignment]
+    running.keys, running.results, running._budget = set("abcdefgh"), {"a": None}, 90.0  # type: ignore[assignment]
     running._start -= 90.0
     running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco", resolution=None, settings={})))  # type: ignore[arg-type]
     assert said[0].startswith("about 10 s left")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -127,15 +127,47 @@ def left_out(results: Mapping[str, Result]) -> set[str]:
     return {key for key, result in results.items() if result.status is Status.LEFT_OUT}
 
 
-def run_plan(
+def settled(planned: Plan, results: Mapping[str, Result], runner: Runner) -> Plan:
+    """The plan without spare steps where the own step agrees as the file expects, or has nothing to judge.
+
+    A row whose own step has no result yet stays as it is.
+    """
+    trials = [(run, run.own_step) for run in planned.runs if run.spare and len(run.ladder) > 1]
+    trials = [(run, trial) for run, trial in trials if trial.keys(planned.truths) <= results.keys()]
+    if not trials:
+        return planned
+    names = {point_name(trial.parameters) for _, trial in trials}
+    truths = {name: case for name, case in planned.truths.items() if name in names}
+    asked = replace(planned, truths=truths, runs=[trial for _, trial in trials])
+    decided: dict[int, Planned] = {}
+    for (run, trial), judged in zip(trials, evaluate(asked, {**results}, runner, diagnosing=False).runs, strict=True):
+        as_expected = judged.verdict is Verdict.AGREES and not judged.contradictions
+        needless = as_expected or judged.result.status is not Status.DONE
+        decided[id(run)] = trial if needless else replace(run, spare=False)
+    return replace(planned, runs=[decided.get(id(run), run) for run in planned.runs])
+
+
+def run_plans(
+    plans: Sequence[Plan], runner: Runner, progress: Callable[[Case, Result], None] | None = None
+) -> tuple[list[Plan], dict[str, Result]]:
+    """Plans without needless steps, and results of their cases by key."""
+    results: dict[str, Result] = {}
+    for item in plans:
+        results |= run_within_budget(item, runner, progress)
+    results |= runner.run([case for item in plans for case in item.first_cases if case.key not in results], progress)
+    plans = [settled(item, results, runner) for item in plans]
+    further = [case for item in plans for case in item.cases if case.key not in results]
+    return plans, results | runner.run(further, progress)
+
+
+def run_within_budget(
     planned: Plan, runner: Runner, progress: Callable[[Case, Result], None] | None = None
 ) -> dict[str, Result]:
-    """Results of a plan's cases by key; with a budget the most useful cases come first."""
-    seconds = planned.comparison.budget
-    if seconds is None:
-        return runner.run(planned.cases, progress)
-    budget = TimeBudget(seconds, planned.comparison.spent)
+    """Results of a plan's cases by key, the most useful cases first; empty without a budget."""
     results: dict[str, Result] = {}
+    if planned.comparison.budget is None:
+        return results
+    budget = TimeBudget(planned.comparison.budget, planned.comparison.spent)
     for cases in planned.stages:
         lost = _without_ladder(planned, results)
         for case in cases:
@@ -201,7 +233,8 @@ def compare(
 ) -> Outcome:
     """Plans, runs and judges a comparison."""
     planned = affordable(plan(comparison, engines, runner.workers), runner)
-    return evaluate(planned, run_plan(planned, runner, progress), runner)
+    (planned,), results = run_plans([planned], runner, progress)
+    return evaluate(planned, results, runner)
 
 
 def _run(planned: Planned, result: Result, **judged: Any) -> Run:
@@ -282,6 +315,7 @@ def _judgements(
                 limit = replace(limit, unsettled=reference.unsettled(name, _last_change(run, name, curves)))
             limit = replace(limit, beside=beside, floor=_floor(facts, name, limit, curves, true.values, reference))
         ladder = facts.resolution is not None and len(run.row.ladder) > 1 and curve.size > 0
+        ladder = ladder and not (run.spare and len(run.ladder) == 1)
         allowance = Allowance(name, reference.scene.observables[name].unit, tolerance.absolute(scale), scale)
         faster = limit is not None and _falls_faster(run, name, curves, true.values, run_curve.vectors)
         judgement = judge_curve(allowance, run_curve, true, Refinement(limit, ladder, lost, faster))

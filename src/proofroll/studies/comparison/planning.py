@@ -31,6 +31,8 @@ _USUAL = [4.0, 2.0, 1.0]
 # Ladders that replace it if its steps do not fit between samples, the cheapest first.
 _LADDERS = (_USUAL, [2.0, 1.0, 0.5], [1.0, 0.5, 0.25])
 
+# Largest number of points of a sweep at which a row has its whole ladder in any case.
+_LADDER_POINTS = 5
 _FIRST = " (the first "  # beginning of a remark in the title of a comparison
 
 
@@ -53,12 +55,16 @@ class Planned:
     """A row at a point, with factor on the step -> case of its ladder.
 
     The run's own case has the factor 1. A row of the formulation whose steps are the reference has no cases.
+
+    Attributes:
+        spare: True if its further steps are run only where results of the own steps ask for them.
     """
 
     row: Row
     parameters: dict[str, float]
     facts: EngineFacts | ProofrollError
     ladder: dict[float, Case] = field(default_factory=dict)
+    spare: bool = False
 
     @property
     def is_reference(self) -> bool:
@@ -69,6 +75,11 @@ class Planned:
     def witness(self) -> bool:
         """True if its engine cross-checks the truth."""
         return isinstance(self.facts, EngineFacts) and self.facts.witness
+
+    @property
+    def own_step(self) -> Planned:
+        """The row with its own step alone."""
+        return replace(self, ladder={factor: case for factor, case in self.ladder.items() if factor == 1})
 
     def keys(self, truths: Mapping[str, Case]) -> set[str]:
         """Keys of the cases that its judgement needs."""
@@ -99,6 +110,11 @@ class Plan:
     def cases(self) -> list[Case]:
         """All cases; equal ones may occur several times, and the runner runs them once."""
         return [case for stage in self.stages for case in stage]
+
+    @property
+    def first_cases(self) -> list[Case]:
+        """All cases but the steps that results of others may make needless."""
+        return replace(self, runs=[run.own_step if run.spare else run for run in self.runs]).cases
 
     @property
     def stages(self) -> list[list[Case]]:
@@ -207,7 +223,9 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     of_engines = {facts.step for facts in resolved if isinstance(facts, EngineFacts)}
     of_engines |= {rung.step for ladder in rungs for rung in ladder.values()}
     between = off_grids(times, of_engines)
+    brief = comparison.briefly()
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
+        with_ladder = _ladder_points(comparison.variations(row), brief.variations(row))
         for point in comparison.variations(row):
             name = point_name(point)
             if name not in scenes:
@@ -224,7 +242,8 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
                 for factor, rung in ladder_facts.items()
                 if f"{facts.name}[formulation={facts.settings['formulation']}]" != reference
             }
-            runs.append(Planned(row, point, facts.on(scene.requires), ladder))
+            spare = len(ladder) > 1 and point not in with_ladder
+            runs.append(Planned(row, point, facts.on(scene.requires), ladder, spare))
     spent = comparison.spent + processor_seconds() - begin
     try:
         scene = load_scene(comparison.scene)
@@ -236,6 +255,15 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     return Plan(
         comparison=replace(comparison, spent=spent), scene=scene, file=file, scenes=scenes, truths=truths, runs=runs
     )
+
+
+def _ladder_points(points: list[dict[str, float]], brief: list[dict[str, float]]) -> list[dict[str, float]]:
+    """Points at which a row has its whole ladder in any case: those of a brief report first, spread evenly."""
+    chosen: list[dict[str, float]] = []
+    for group in (brief, [point for point in points if point not in brief]):
+        count = min(len(group), _LADDER_POINTS - len(chosen))
+        chosen += [group[index] for index in np.linspace(0, len(group) - 1, count).round().astype(int)]
+    return chosen
 
 
 def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:

@@ -11,7 +11,7 @@ from proofroll.files.data_folders import study_folders
 from proofroll.files.scene_file import is_scene
 from proofroll.files.toml import study_of
 from proofroll.running.runner import Runner
-from proofroll.studies.comparison.compare import evaluate
+from proofroll.studies.comparison.compare import evaluate, run_plans
 from proofroll.studies.comparison.default_comparison import default_comparison
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import plan
@@ -70,8 +70,7 @@ def outcomes_of_versions(
 
     ``progress`` is called with the engine of each case that has ended.
     """
-    plans = [[plan(item, [side], runner.workers) for item in comparisons] for side in sides]
-    cases = {case.key: case for of_side in plans for item in of_side for case in item.cases}
-    results = runner.run(cases.values(), lambda case, _: progress(case.engine.name))
-    outcomes, new_outcomes = ([evaluate(item, results, runner) for item in of_side] for of_side in plans)
-    return outcomes, new_outcomes
+    asked = [plan(item, [side], runner.workers) for side in sides for item in comparisons]
+    plans, results = run_plans(asked, runner, lambda case, _: progress(case.engine.name))
+    outcomes = [evaluate(item, results, runner) for item in plans]
+    return outcomes[: len(comparisons)], outcomes[len(comparisons) :]

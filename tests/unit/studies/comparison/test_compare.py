@@ -28,7 +28,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.running.time_budget import TimeBudget
-from proofroll.studies.comparison.compare import affordable, compare, evaluate, run_plan
+from proofroll.studies.comparison.compare import affordable, compare, evaluate, run_plans, run_within_budget
 from proofroll.studies.comparison.expectations import contradictions_of
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import Plan, Planned, point_name
@@ -71,6 +71,20 @@ def judged(
     ``true``: speeds without a truth; ``rungs``: what comes of other steps, by their factors; ``between``: times off
     the grid [s] that are sampled, too.
     """
+    planned, results, runner = answered(folder, comparison, answer, true, rungs, certificate, between)
+    return evaluate(planned, results, runner)
+
+
+def answered(
+    folder: Path,
+    comparison: Comparison,
+    answer: Answer,
+    true: Mapping[float, Result | xr.Dataset] | None = None,
+    rungs: Mapping[float, Answer] | None = None,
+    certificate: Sequence[Line] = (),
+    between: Sequence[float] = (),
+) -> tuple[Plan, dict[str, Result], Runner]:
+    """The plan, results and runner of :func:`judged`, of the same arguments."""
     store, results = Store(folder), dict[str, Result]()
     runs, truths, scenes = list[Planned](), dict[str, Case](), dict[str, Scene]()
 
@@ -99,7 +113,7 @@ def judged(
                 ladder[factor] = put(Case(*given, scaled, comparison.until, comparison.every), how(scene, dataset))
             runs.append(Planned(row, point, facts, ladder))
     usual, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
-    return evaluate(Plan(comparison, usual, file, scenes, truths, runs), results, Runner(store, jobs=1))
+    return Plan(comparison, usual, file, scenes, truths, runs), results, Runner(store, jobs=1)
 
 
 def the_truth(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
@@ -611,18 +625,75 @@ def test_the_other_steps_of_a_lost_row_are_not_run(status: Status) -> None:
             return {case.key: Result(status if case.key == fine[1.0].key else Status.DONE, "so") for case in cases}
 
     told: dict[str, Result] = {}
-    results = run_plan(asked, Answering(), lambda case, result: told.update({case.key: result}))  # type: ignore[arg-type]
+    results = run_within_budget(asked, Answering(), lambda case, result: told.update({case.key: result}))  # type: ignore[arg-type]
     assert results.keys() == {case.key for case in asked.cases}
     assert set(ran) == results.keys(), "the finer row shares its other steps with the coarser one"
     alone = dataclasses.replace(asked, runs=rows[:1])
     ran.clear()
-    results = run_plan(alone, Answering(), lambda case, result: told.update({case.key: result}))  # type: ignore[arg-type]
+    results = run_within_budget(alone, Answering(), lambda case, result: told.update({case.key: result}))  # type: ignore[arg-type]
     assert results.keys() == {case.key for case in alone.cases}
     others = {fine[2.0].key, fine[4.0].key}
     assert set(ran) & others == (others if status is Status.DONE else set())
     if status is not Status.DONE:
         assert all(results[key] is told[key] for key in others)
         assert {results[key].status for key in others} == {Status.NOT_RUN}
+
+
+CLAIMS = {
+    "agrees": {},
+    "any": {"expect": list(Verdict), "because": "a look"},
+    "order": {"order": {"z": (1.8, 2.2)}},
+    "unconfirmed": {"expect": [Verdict.UNCONFIRMED], "because": "its limit is another"},
+}
+
+
+@pytest.mark.drill_of("0.5-2-0.0-agrees", "0.5-2-0.0-unconfirmed")
+@pytest.mark.parametrize("claimed", CLAIMS)
+@pytest.mark.parametrize("beside", [0.0, 0.3, 0.9, 5.0])
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("error", [0.0, 0.5, 20.0])
+def test_spare_steps_make_no_verdict_worse(
+    error: float, order: int, beside: float, claimed: str, tmp_path: Path
+) -> None:
+    """Steps that are left out where the own one agrees change no other verdict and bring no contradiction.
+
+    ``error``: of the own step, ``beside``: of the limit of small steps, as parts of the tolerance.
+    """
+
+    def by_step(factor: float) -> Answer:
+        def answer(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+            shape = np.sin(np.linspace(0.0, 3.0, dataset.sizes["time"]))
+            return dataset.assign(z=dataset["z"] + 1e-3 * shape * (beside + error * factor**order))
+
+        return answer
+
+    row = dataclasses.replace(ROW, ladder=[4.0, 2.0, 1.0], **CLAIMS[claimed])
+    comparison = claim([row], [4.0], {"z": Tolerance(1e-3, False, "m")})
+    rungs = {factor: by_step(factor) for factor in (4.0, 2.0)}
+    planned, results, runner = answered(tmp_path, comparison, by_step(1.0), rungs=rungs)
+    whole = evaluate(planned, results, runner)
+    ran: list[str] = []
+
+    class Answering:
+        store = runner.store
+
+        def run(self, cases: Sequence[Case], _: object) -> dict[str, Result]:
+            ran.extend(case.key for case in cases)
+            return {case.key: results[case.key] for case in cases}
+
+    spare = dataclasses.replace(planned, runs=[dataclasses.replace(run, spare=True) for run in planned.runs])
+    (kept,), partly = run_plans([spare], Answering())  # type: ignore[arg-type]
+    assert len(ran) == len(set(ran)) == len(partly)
+    outcome = evaluate(kept, partly, runner)
+    (now,), (before,) = outcome.runs, whole.runs
+    if ran == [case.key for case in planned.cases]:
+        assert outcome == dataclasses.replace(whole, points=outcome.points)
+    else:
+        assert now.verdict is Verdict.AGREES
+        assert not now.contradictions
+        assert all(judgement.limit is LimitResult.NO_LADDER for judgement in now.judgements)
+    if error + beside > 1 or claimed in {"order", "unconfirmed"}:
+        assert (now.verdict, now.contradictions) == (before.verdict, before.contradictions)
 
 
 LEFT_OUT = Result(Status.LEFT_OUT, "the 60 s of processor time did not suffice")

@@ -62,6 +62,35 @@ def test_a_ladder_fits_between_the_samples(step: float, factors: list[float]) ->
     assert all(run.ladder.keys() == set(factors) for run in found.runs)
 
 
+@pytest.mark.drill
+def test_two_rows_at_twelve_points_ask_for_20_further_runs_at_first() -> None:
+    """A sweep has the ladder at five points, where at all twelve it would have 48 further runs."""
+    comparison = load_comparison("accuracy")
+    rows = [Row(f"mujoco[formulation=chart,dt={step}]", comparison.rows[0].tolerance) for step in (1e-3, 5e-4)]
+    speeds = [1.0 + number for number in range(12)]
+    asked = dataclasses.replace(comparison, rows=rows, until=0.1, every=0.02, vary={"speed": speeds}, points=[])
+    found = planning.plan(asked)
+    assert len(found.ladders) == 48
+    assert len(found.first_cases) == 12 + 2 * 12 + 20
+    assert not any(run.spare for run in planning.plan(dataclasses.replace(asked, vary={"speed": speeds[:5]})).runs)
+
+
+@pytest.mark.parametrize(
+    ("count", "brief", "chosen"),
+    [
+        (12, [], [0, 3, 6, 8, 11]),
+        (12, [3, 4], [0, 3, 4, 6, 11]),
+        (12, [*range(8)], [0, 2, 4, 5, 7]),
+        (3, [1], [0, 1, 2]),
+    ],
+)
+def test_the_points_with_a_ladder_are_spread(count: int, brief: list[int], chosen: list[int]) -> None:
+    """Those of a brief report come first, the others lie from the first point to the last."""
+    points = [{"speed": float(number)} for number in range(count)]
+    found = planning._ladder_points(points, [points[number] for number in brief])
+    assert sorted(point["speed"] for point in found) == chosen
+
+
 def test_a_comparison_without_motion_is_refused() -> None:
     """An end at the start, where every engine is right, is one line."""
     with pytest.raises(InputError, match=r"until = 0\.0: the value must be above 0"):
