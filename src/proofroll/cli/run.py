@@ -15,8 +15,11 @@ from proofroll.cli import options
 from proofroll.core.limits import RUN_TIME_LIMIT
 
 if TYPE_CHECKING:
+    from threading import Thread
+
     from proofroll.report.run.run import RunContent
     from proofroll.running.case import Case
+    from proofroll.running.idle_workers import Workers
 
 
 def run(
@@ -66,9 +69,11 @@ def run(
     """Run one scene in one engine."""
     import math
     import tempfile
-    import threading
 
-    from proofroll.running.engine_questions import prepare
+    from proofroll.running.forked import may_be_forked
+
+    forked = may_be_forked()  # before anything imports numpy
+
     from proofroll.running.idle_workers import Workers
 
     settings, question, scene = (
@@ -79,17 +84,15 @@ def run(
     if matrices:
         _show_matrices(scene, engine, options.assignments(settings), as_json)
         return
-    workers = Workers(
-        patience=time_limit if time_limit > 0 else math.inf
-    )  # one process resolves the settings and makes the run
-    # It imports the engine while this process imports the modules that read scenes and results.
-    preparing = threading.Thread(target=prepare, args=(engine, workers), daemon=True)
-    preparing.start()
+    # One process resolves the settings and makes the run.
+    workers = Workers(patience=time_limit if time_limit > 0 else math.inf)
+    preparing = None if forked else _preparing(engine, workers)
 
     from proofroll.studies.cases import scene_of_run, single_case
 
     chosen, asks = options.assignments(settings), tuple(dict.fromkeys(ask or []))
     loaded = scene_of_run(scene, chosen, asks)  # a mistyped name is answered before more is imported
+    preparing = preparing or _preparing(engine, workers, forked=True)
     if control is not None or settings:
         options.doubt_numbers(scene, settings)
 
@@ -138,6 +141,22 @@ def run(
         options.show(content, as_json, parts, widest=WIDTH)
     if not done or content.ends is not None:
         raise typer.Exit(options.ENGINE)
+
+
+def _preparing(engine: str, workers: Workers, *, forked: bool = False) -> Thread:
+    """Thread in which a worker imports the engine, while this process imports the modules that read results.
+
+    ``forked``: True if the worker has the modules that are imported here already, those of scenes.
+    """
+    from threading import Thread
+
+    from proofroll.running.engine_questions import prepare
+
+    if forked:
+        workers.fork(engine.partition("[")[0])
+    thread = Thread(target=prepare, args=(engine, workers), daemon=True)
+    thread.start()
+    return thread
 
 
 def _comparison(scene: str, engine: str, settings: list[str] | None, control: Path | None, until: float | None) -> str:

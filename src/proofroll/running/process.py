@@ -18,13 +18,9 @@ from typing import Any, Self
 from proofroll.core.errors import InputError, Missing, ProofrollError, Unwritable
 from proofroll.core.pace import AT, PACE
 from proofroll.running.case import Status
+from proofroll.running.forked import THREADS, Forked
 from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
 
-# One thread per worker, set before anything is imported there: workers run side by side.
-THREADS = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"),
-    "1",
-)
 # A worker draws nothing; MuJoCo would look for a library of windows, which takes a tenth of a second.
 _NO_WINDOWS = {"MUJOCO_GL": "disable"}
 # Variables that redirect a Python's imports or start-up; they are meant for this Python, not for another interpreter.
@@ -109,13 +105,15 @@ class Worker:
     Args:
         memory: limit for it and its descendants [GB]; by default :func:`memory.memory_limit`.
         python: another interpreter in which it runs; by default this one.
+        forked: True to fork it with the modules that this process has imported, see
+            :func:`.forked.may_be_forked`.
 
     Attributes:
         waited: wall time for the last answer; for the first one from the start of the process [s].
         used: processor time of the process until its last answer [s].
     """
 
-    def __init__(self, memory: float | None = None, python: Path | None = None) -> None:
+    def __init__(self, memory: float | None = None, python: Path | None = None, *, forked: bool = False) -> None:
         self._began, self.waited = time.perf_counter(), 0.0
         self._memory = memory or memory_limit()
         self._ending = threading.Lock()
@@ -126,16 +124,24 @@ class Worker:
         self._open = [self._answers, self._words]
         self._descriptors = [*self._open, self._life]
         try:
-            self._process = subprocess.Popen(
-                [python or sys.executable, "-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)],
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=log,
-                pass_fds=(writer, life),
-                env=_NO_WINDOWS | (environment_of_another() if python else safe_environment()) | THREADS,
-                text=True,
-                start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
-            )
+            self._process: subprocess.Popen[str] | Forked
+            environment = _NO_WINDOWS | (environment_of_another() if python else safe_environment()) | THREADS
+            if forked:
+                self._process = Forked(writer, log, life, environment)
+            else:
+                self._process = subprocess.Popen(
+                    [
+                        python or sys.executable,
+                        *("-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)),
+                    ],
+                    stdin=subprocess.PIPE,
+                    stdout=log,
+                    stderr=log,
+                    pass_fds=(writer, life),
+                    env=environment,
+                    text=True,
+                    start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
+                )
         except OSError as error:
             for descriptor in self._descriptors:
                 os.close(descriptor)

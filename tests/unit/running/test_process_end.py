@@ -59,6 +59,26 @@ program.stdout.readline()
 Path(sys.argv[1]).touch()
 program.wait()
 """
+FORKED = """
+import sys
+from pathlib import Path
+from proofroll.running.forked import may_be_forked
+
+assert may_be_forked()
+from proofroll.running.process import Worker
+
+begun = Path(sys.argv[1])
+engine = begun.with_name("engine.py")
+engine.write_text('''
+import ctypes, subprocess, sys
+from pathlib import Path
+
+subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+Path(__file__).with_name("begun").touch()
+ctypes.PyDLL(None).sleep(600)
+''')
+Worker(forked=True).ask({"do": "call", "function": "runpy:run_path", "arguments": {"path_name": str(engine)}}, 600)
+"""
 HOLDER = """
 import os, subprocess, sys
 life, held = os.pipe()
@@ -119,10 +139,11 @@ def test_an_interrupt_waits_until_processes_have_begun() -> None:
 
 @pytest.mark.parametrize(
     ("code", "before"),
-    [(POOL, []), (PROGRAM, []), (CHILD, ["-c", PARENT]), (PIPED, ["-c", HOLDER])],
+    [(POOL, []), (PROGRAM, []), (FORKED, []), (CHILD, ["-c", PARENT]), (PIPED, ["-c", HOLDER])],
     ids=[
         "a pool",
         "a program",
+        "a forked worker in which no thread can run, and its child",
         "a process with a child of its own",
         "a process in which no thread can run, and its child",
     ],

@@ -19,7 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, round_off_of
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.trajectory_file import read
-from proofroll.running import process
+from proofroll.running import forked
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
@@ -36,7 +36,7 @@ WRONG = "one that the truth does not have"
 
 def main(folder: str, threads: str, jobs: str, *comparisons: str) -> None:
     """Runs the comparisons and studies and writes what they decide."""
-    process.THREADS.update(dict.fromkeys(process.THREADS, threads))
+    forked.THREADS.update(dict.fromkeys(forked.THREADS, threads))
     place = Path(folder)
     if any(place.glob("store/*")):
         raise SystemExit(f"{place} holds results of another arithmetic; name an empty folder")

@@ -1,0 +1,117 @@
+"""Forked workers: they begin as started ones do, and end in the same words."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from proofroll.running.forked import may_be_forked
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux alone")
+
+# Module of a worker: what it sees, and what ends it.
+PROBE = """
+import ctypes, os, signal, sys, threading, warnings
+
+def seen():
+    handlers = [str(signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    variables = {name: value for name, value in os.environ.items() if name.endswith("_THREADS") or "MUJOCO" in name}
+    found = {"path": sys.path, "folder": os.getcwd(), "handlers": handlers, "variables": variables}
+    found |= {"leads": os.getsid(0) == os.getpid(), "input": sys.stdin.read(), "threads": threading.active_count()}
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    links = [f"/proc/self/fd/{number}" for number in os.listdir("/proc/self/fd")]
+    files = [os.readlink(link) for link in links if os.path.lexists(link)]
+    kinds = sorted(name.partition(":")[0] for name in files)
+    return found | {"blocked": sorted(map(int, blocked)), "files": kinds, "safe": os.environ["PYTHONSAFEPATH"]}
+
+def cry(how):
+    print("the last word", file=sys.stderr)
+    if how == "kill":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    os._exit(3)
+"""
+PROGRAM = """
+import json, signal, sys, tempfile
+from proofroll.running.forked import may_be_forked
+assert may_be_forked()
+from proofroll.core.errors import ProofrollError
+from proofroll.running.process import Worker
+for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    signal.signal(number, lambda *_: None)
+opened = tempfile.TemporaryFile()
+answers = []
+for forked, requests in json.loads(sys.argv[1]):
+    with Worker(forked=forked) as worker:
+        for function, arguments in requests:
+            try:
+                ask = {"do": "call", "function": f"probe:{function}", "arguments": arguments}
+                answers.append(worker.request(ask, 60))
+            except ProofrollError as error:
+                answers.append(str(error))
+print(json.dumps(answers))
+"""
+
+
+def answers(folder: Path, *workers: tuple[bool, list[tuple[str, dict[str, str]]]]) -> list[object]:
+    """What workers, forked or started, answer to requests from a process of its own in a folder."""
+    (folder / "probe.py").write_text(PROBE)
+    (folder / "work").mkdir()
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, json.dumps(workers)],
+        cwd=folder / "work", env={"PYTHONPATH": str(folder), "MUJOCO_GL": "egl"}, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found: list[object] = json.loads(done.stdout)
+    return found
+
+
+@pytest.mark.drill
+def test_a_forked_worker_begins_as_a_started_one(tmp_path: Path) -> None:
+    """It has the path, folder, variables, signals, session and open files of a worker in a new interpreter."""
+    forked, started = answers(tmp_path, (True, [("seen", {})]), (False, [("seen", {})]))
+    assert forked == started
+
+
+@pytest.mark.drill
+def test_a_forked_worker_ends_in_words(tmp_path: Path) -> None:
+    """A crash or an exit of an engine is a sentence with what it printed, and a mistake leaves the worker alive."""
+    ends = [("cry", {"how": "kill"})], [("cry", {"how": "exit"})], [("none", {}), ("seen", {})]
+    killed, left, mistake, seen = answers(tmp_path, *((True, requests) for requests in ends))
+    assert killed == "the engine's process was killed by SIGSEGV: the last word"
+    assert left == "the engine's process ended with exit code 3: the last word"
+    assert "AttributeError" in str(mistake)
+    assert isinstance(seen, dict)
+
+
+def test_only_a_process_with_one_thread_forks() -> None:
+    """A process that has numpy, whose libraries may have started threads, starts its workers."""
+    import numpy as np
+
+    assert np.zeros(1).size
+    assert not may_be_forked()
+
+
+@pytest.mark.drill
+def test_a_run_starts_no_other_interpreter(tmp_path: Path) -> None:
+    """The command forks its worker from itself once it has read the scene, which halves the cost of a short run."""
+    program = """
+import subprocess, sys
+from proofroll.cli import main
+
+def refuse(*_, **__):
+    raise OSError("an interpreter was started")
+
+subprocess.Popen.__init__ = refuse
+sys.argv = "proofroll run pendulum --engine projection --until 0.1".split()
+main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "projection" in done.stdout
