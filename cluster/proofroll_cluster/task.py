@@ -22,9 +22,8 @@ from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import STORED
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.engine_questions import resolve
-from proofroll.running.identity import digest
+from proofroll.running.identity import digest, versions_of
 from proofroll.running.idle_workers import Workers
-from proofroll.running.manifest import versions_of
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import result_without_answer, run_one
 

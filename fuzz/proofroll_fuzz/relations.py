@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll import InputError, load_scene
-from proofroll.files.toml_text import toml_text
+from proofroll.files.toml import toml_text
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import write_text

@@ -26,7 +26,7 @@ from proofroll.engines.exudyn.integration import simulation_settings
 from proofroll.engines.exudyn.native import Output, exu, items
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.exudyn.carrier import Carrier
-from proofroll.papers.blajer_2006.exudyn.rolling_disc import RollingDisc
+from proofroll.papers.blajer_2006.exudyn.formulations import RollingDisc
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder
 
 Exudyn = load_engine("exudyn")

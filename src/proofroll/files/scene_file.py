@@ -26,8 +26,7 @@ from proofroll.files.data_folders import data_folder
 from proofroll.files.json_data import plain
 from proofroll.files.scene_parameters import Parameter, check_parameters, units_read, values_of
 from proofroll.files.scene_sources import source_of, stem_of
-from proofroll.files.toml import named_file, read_toml
-from proofroll.files.toml_text import toml_text
+from proofroll.files.toml import named_file, read_toml, toml_text
 
 
 @dataclass(frozen=True)

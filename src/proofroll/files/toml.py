@@ -1,8 +1,10 @@
-"""TOML files: reading them with one clear line about the first mistake, and finding those of a study."""
+"""TOML files: reading with one clear line about the first mistake, writing plain tables, finding those of a study."""
 
+import json
+import math
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -112,3 +114,39 @@ def study_file(name: str, study: str) -> tuple[Path, dict[str, Any]]:
             advice = f"there is no such file; choose one of {', '.join(item.stem for item in ours)}, or give a path"
             raise InputError(study, name, advice)
     return path, study_content(path, study)
+
+
+def toml_text(content: Mapping[str, Any]) -> str:
+    """Text of a TOML file: numbers, texts and lists first, then tables and lists of tables.
+
+    Args:
+        content: name -> number, text, bool, list of these, table, or list of tables.
+    """
+    plain = {name: value for name, value in content.items() if not _is_table(value)}
+    lines = [f"{name} = {_value(value)}" for name, value in plain.items()]
+    for name, value in content.items():
+        if name in plain:
+            continue
+        header, tables = (f"[{name}]", [value]) if isinstance(value, Mapping) else (f"[[{name}]]", value)
+        for table in tables:
+            lines += ["", header, *(f"{key} = {_value(item)}" for key, item in table.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _is_table(value: object) -> bool:
+    return isinstance(value, Mapping) or (isinstance(value, list) and bool(value) and isinstance(value[0], Mapping))
+
+
+def _value(value: Any) -> str:
+    """A value as TOML writes it; an inner table in braces."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, str):
+        return json.dumps(str(value), ensure_ascii=False)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and not math.isfinite(value):
+        return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
+    return repr(float(value)) if isinstance(value, float) else repr(value)  # numpy's float has another text

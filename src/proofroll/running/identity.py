@@ -1,26 +1,29 @@
-"""Identity of an engine: its settings, its versions and the code that decides its results."""
+"""Identity of an engine, its settings, versions and code that decides its results, and of the worker that runs it."""
 
+import contextlib
 import dataclasses
 import hashlib
 import inspect
+import json
 import platform
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import proofroll
+from proofroll.core.certificate import Line, Standing
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError
 from proofroll.core.formulations import added_by
 from proofroll.core.plugins import ELEMENTS, place_of
+from proofroll.core.scene import Scene
 from proofroll.core.source_code import OWN, hash_of, package_of, with_imports
 from proofroll.core.truth import load_truths
 from proofroll.files.json_data import plain
 from proofroll.running.case import EngineDescription, EngineFacts
-from proofroll.running.manifest import version_of, versions_of
 from proofroll.running.program import path_of
 
 # Folders whose code decides every result; reports and the command line do not.
@@ -182,3 +185,78 @@ def _of(kind: Any) -> list[Path]:
     _, *inside = kind.__module__.split(".")
     source = OWN.joinpath(*inside[: 1 if inside[0] == "truth" else 2])
     return [source if source.is_dir() else source.with_suffix(".py")]
+
+
+# Version of the protocol of requests and answers; see docs/worker_protocol.md.
+PROTOCOL = 2
+
+
+def identify_and_settle(place: str) -> dict[str, Any]:
+    """Identity of this worker, which from now on serves only engines ``NAME@place``."""
+    from proofroll.running import loading
+
+    loading.serve_place(place)
+    return own() | {"interpreter": sys.executable, "python": platform.python_version()}
+
+
+@cache
+def own() -> dict[str, Any]:
+    """Version of the protocol, and version and code hash of this proofroll."""
+    return {"protocol": PROTOCOL, "proofroll": proofroll.__version__, "code": digest([])}
+
+
+def mismatch(answer: Mapping[str, Any]) -> str:
+    """Reason why a worker with this identity cannot serve this process; empty: it can.
+
+    Its code must be the same, not only its version, as the worker reads scenes, certifies and records.
+    """
+    mine = own()
+    if answer.get("protocol") != PROTOCOL:
+        return f"speaks protocol {answer.get('protocol')} of workers, and this proofroll speaks {PROTOCOL}"
+    if answer.get("proofroll") != mine["proofroll"]:
+        return f"has proofroll {answer.get('proofroll')}, and this is {mine['proofroll']}"
+    if answer.get("code") != mine["code"]:
+        return f"has other code of proofroll {mine['proofroll']} than this one"
+    return ""
+
+
+def versions(engine: str, version: str) -> dict[str, str]:
+    """Versions of the engine, of proofroll, Python, numpy and scipy."""
+    packages = {"proofroll": proofroll.__version__, "python": platform.python_version()}
+    return {engine: version} | packages | {name: version_of(name) for name in ("numpy", "scipy")}
+
+
+# Version of an installed package; cached, as reading it takes a millisecond and every run needs it.
+version_of = cache(metadata.version)
+
+
+def versions_of(names: Iterable[str], read: Callable[[str], str] = metadata.version) -> dict[str, str]:
+    """Versions of those of the named packages that are installed, each by ``read``."""
+    found_versions = {}
+    for name in names:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found_versions[name] = read(name)
+    return found_versions
+
+
+def manifest(
+    engine: str,
+    settings: Mapping[str, Any],
+    scene: Scene,
+    made_with: Mapping[str, str],
+    certificate: Iterable[Line] = (),
+) -> dict[str, str]:
+    """Attributes of a trajectory: engine, settings, parameters [SI], versions, interpreter and machine.
+
+    Settings, parameters and versions are JSON. ``not_reported`` lists quantities of the certificate that the engine
+    does not report, if there are any.
+    """
+    silent = ", ".join(line.quantity for line in certificate if line.standing is Standing.NOT_REPORTED)
+    return ({"not_reported": silent} if silent else {}) | {
+        "engine": engine,
+        "settings": json.dumps(dict(settings), sort_keys=True),
+        "parameters": json.dumps(dict(scene.parameters)),
+        "versions": json.dumps(dict(made_with)),
+        "interpreter": sys.executable,
+        "machine": f"{platform.machine()} {platform.system()}",
+    }

@@ -13,7 +13,7 @@ from proofroll.core.plugins import place_of, plain_name
 from proofroll.running import environments
 from proofroll.running.bound_program import printed_by
 from proofroll.running.case import Status
-from proofroll.running.handshake import mismatch
+from proofroll.running.identity import mismatch
 from proofroll.running.process import Worker, WorkerDied, environment_of_another
 from proofroll.running.program import PREFIX
 

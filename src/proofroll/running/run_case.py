@@ -17,9 +17,9 @@ from proofroll.core.limits import FOR_A_TRUTH
 from proofroll.core.pace import AT, PACE
 from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, Result, Status
-from proofroll.running.integrity import changed
-from proofroll.running.manifest import manifest
-from proofroll.running.manifest import versions as made_with
+from proofroll.running.identity import manifest
+from proofroll.running.identity import versions as made_with
+from proofroll.running.loading import changed
 from proofroll.running.time_case import clean_runs
 
 if TYPE_CHECKING:

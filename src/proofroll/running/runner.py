@@ -21,9 +21,8 @@ from proofroll.running.case import Case, Result, Status
 from proofroll.running.engine_questions import lent_workers
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker, WorkerDied, status_of
-from proofroll.running.profile import ProcessorProfile
 from proofroll.running.store import Store
-from proofroll.running.time_budget import TimeBudget
+from proofroll.running.time_budget import ProcessorProfile, TimeBudget
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster

@@ -19,8 +19,7 @@ from proofroll.core.time_grid import EVERY, off_grid, require_whole_steps, sampl
 from proofroll.core.whole_turns import samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.files.scene_sources import with_control
-from proofroll.running.identity import truth_version
-from proofroll.running.manifest import manifest, versions
+from proofroll.running.identity import manifest, truth_version, versions
 from proofroll.running.recording import record
 
 if TYPE_CHECKING:
@@ -85,7 +84,7 @@ def simulate(
 
     Returns:
         Dataset with the attributes ``status`` (``done`` or ``diverged``), ``message`` (one sentence) and those of
-        :func:`proofroll.running.manifest.manifest`: engine, settings, parameters, versions. The truth's variables have
+        :func:`proofroll.running.identity.manifest`: engine, settings, parameters, versions. The truth's variables have
         an attribute ``error_bar``, in their unit.
 
     Raises:

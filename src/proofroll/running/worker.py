@@ -25,8 +25,7 @@ from proofroll.core.errors import (
 )
 from proofroll.core.pace import PACE
 from proofroll.running.case import Case
-from proofroll.running.handshake import identify_and_settle
-from proofroll.running.identity import describe, resolve
+from proofroll.running.identity import describe, identify_and_settle, resolve
 from proofroll.running.loading import watch_foreign
 from proofroll.running.memory import volunteer
 from proofroll.running.process_end import end_with, end_with_pipe

@@ -20,8 +20,7 @@ from proofroll.core.truth import TRUTHS
 from proofroll.files.atomic import ordinary_content
 from proofroll.files.json_data import plain, record
 from proofroll.running.environments import remembered
-from proofroll.running.identity import ASIDE
-from proofroll.running.manifest import versions_of
+from proofroll.running.identity import ASIDE, versions_of
 from proofroll.running.store import seal, write_text
 from proofroll.running.timing import machine
 

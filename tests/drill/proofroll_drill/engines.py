@@ -25,7 +25,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
-from proofroll.papers.blajer_2006.projection.settings import ProjectionBallSettings
+from proofroll.papers.blajer_2006.projection.run import ProjectionBallSettings
 
 Projection = load_engine("projection")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 
-from proofroll.files.toml_text import toml_text
+from proofroll.files.toml import toml_text
 
 
 def test_written_tables_are_read_as_they_were() -> None:

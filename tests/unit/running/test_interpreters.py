@@ -18,7 +18,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running import interpreters
 from proofroll.running.case import Case, EngineFacts, Status
 from proofroll.running.engine_questions import describe, resolve
-from proofroll.running.handshake import mismatch, own
+from proofroll.running.identity import mismatch, own
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner, run_one
@@ -180,9 +180,7 @@ def test_another_proofroll_is_not_trusted(tmp_path: Path) -> None:
     assert "has proofroll 0.0.1, and this is" in mismatch(mine | {"proofroll": "0.0.1"})
     python = seeing(tmp_path / "venv", "1.0")
     site = site_of(python)
-    (site / "patch.py").write_text(
-        "import proofroll.running.handshake as h; h.own = lambda o=h.own(): o | {'code': ''}"
-    )
+    (site / "patch.py").write_text("import proofroll.running.identity as h; h.own = lambda o=h.own(): o | {'code': ''}")
     (site / "z.pth").write_text("import sys; 'proofroll.running.worker' in sys.orig_argv and __import__('patch')\n")
     (found,) = resolve([(f"aged@{python}", {})])
     assert isinstance(found, Missing)

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from proofroll.running.case import Result, Status
-from proofroll.running.profile import START, TIMING, TRUTHS, ProcessorProfile
+from proofroll.running.time_budget import START, TIMING, TRUTHS, ProcessorProfile
 
 
 def spend(seconds: float) -> None:
@@ -46,7 +46,7 @@ def test_parts_of_a_case_belong_to_phases_of_their_own() -> None:
 def test_workers_go_on_while_this_process_judges(monkeypatch: pytest.MonkeyPatch) -> None:
     """What workers use meanwhile belongs to the phase around, in which they were asked."""
     used = [0.0]
-    monkeypatch.setattr("proofroll.running.profile.processor_seconds", lambda: time.process_time() + used[0])
+    monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: time.process_time() + used[0])
     profile = ProcessorProfile()
     with profile.phase("comparisons"), profile.phase("judging"):
         used[0] = 100.0

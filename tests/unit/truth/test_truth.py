@@ -19,8 +19,7 @@ from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinate
 from proofroll.truth.error_bars import NUDGE
 from proofroll.truth.numerics import compiled_once
 from proofroll.truth.plug_in import MechanismTruth
-from proofroll.truth.smooth.singular_poses import BRANCHING
-from proofroll.truth.smooth.smooth_truth import CHAOS, _SmoothTruth, find_truth
+from proofroll.truth.smooth.smooth_truth import BRANCHING, CHAOS, _SmoothTruth, find_truth
 from proofroll.truth.switched_truth import switched_truth
 from proofroll.truth.switching import contact_taylor
 from proofroll.truth.truth_of_mechanism import truth_of

@@ -22,7 +22,7 @@ from proofroll.files.trajectory_file import read_columns
 from proofroll.report.labels import engine_words, omitted_lines, precision_words, preset_name, settings_text, step
 from proofroll.report.run.last_values import FORCES, bounce_table, short_names, value_table
 from proofroll.running.case import Case, Result, Status
-from proofroll.studies.judging.quiet import quiet
+from proofroll.studies.judging.reference import quiet
 
 _FEW = 3  # most forces and moments that are shown without being asked for
 _FEW_BODIES = 6  # most bodies whose places are shown where no point is tracked

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from proofroll.report.comparison.records import ReportedComparison
     from proofroll.report.page.records import ReportContent
-    from proofroll.running.profile import ProcessorProfile
+    from proofroll.running.time_budget import ProcessorProfile
 
 _FINE = (Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE)
 

@@ -16,9 +16,9 @@ from proofroll.running.case import Status
 from proofroll.running.engine_questions import on_scene, resolve_with_truth
 from proofroll.running.identity import libraries
 from proofroll.running.process import processor_seconds
-from proofroll.running.profile import TIMING
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.time_budget import TIMING
 from proofroll.running.timing import time_in_rounds
 from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion

@@ -243,7 +243,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
                 if f"{facts.name}[formulation={facts.settings['formulation']}]" != reference
             }
             spare = len(ladder) > 1 and point not in with_ladder
-            runs.append(Planned(row, point, facts.on(scene.requires), ladder, spare))
+            runs.append(Planned(row, point, facts.on(scene.requires), ladder, spare=spare))
     spent = comparison.spent + processor_seconds() - begin
     try:
         scene = load_scene(comparison.scene)

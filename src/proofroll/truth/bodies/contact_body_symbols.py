@@ -9,11 +9,11 @@ from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.modes import ContactMode, Features, features_of
 from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFriction
 from proofroll.elements.mechanism.scene.kinks import Sides
-from proofroll.truth.bodies.body_elimination import BodySystem
 from proofroll.truth.bodies.constraint_rows import ConstraintRow
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_bodies import AXES, BodyInScalars
 from proofroll.truth.bodies.maximal_equations import Switched
+from proofroll.truth.bodies.maximal_taylor import BodySystem
 from proofroll.truth.numerics.elimination import Row
 from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
 from proofroll.truth.switching.contact_symbols import (

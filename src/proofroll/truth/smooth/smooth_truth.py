@@ -7,7 +7,7 @@ truth, the others give its error bar. If in both routes a start displaced by :da
 conservative mechanism has failed, and shows no chaos.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -20,7 +20,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
-from proofroll.elements.mechanism.dynamics.analysis import analyse, singular_values
+from proofroll.elements.mechanism.dynamics.analysis import RowSign, analyse, singular_values
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.link_forces import powers, working
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
@@ -43,7 +43,6 @@ from proofroll.truth.error_bars import (
 from proofroll.truth.followed_paths import FollowedPath, before_first, end_of, followed, time_accuracy, two_route_motion
 from proofroll.truth.natural_units import Units, natural_units
 from proofroll.truth.numerics.hybrid import HybridPath, Stretch
-from proofroll.truth.smooth.singular_poses import BRANCHING, singular_poses, singular_poses_of
 from proofroll.truth.smooth.smooth_routes import SmoothBodies, SmoothTree, stiff
 from proofroll.truth.witnesses.closed_forms import ClosedForm, closed_form
 from proofroll.truth.work_of_drives import works_of_steps
@@ -409,3 +408,46 @@ def _apart_in_fields(mechanism: Mechanism, record: Record, second: Record, part:
 def _apart(record: Record, second: Record, unit: float = 1.0) -> Array:
     """Largest difference of two motions at each time, in positions, which are in a ``unit``, and quaternions [1]."""
     return np.maximum(largest(record.p_WB - second.p_WB) / unit, largest(record.q_WB - second.q_WB))
+
+
+BRANCHING = "the rows of the loops lose rank and the motion may branch: any change of the lengths may lead elsewhere"
+_TURN = 0.02  # step between poses of a closed form, rad or natural lengths of the fastest coordinate
+_FEW, _MOST = 50, 20_000  # limits of the number of poses
+
+
+def singular_poses(mechanism: Mechanism, until: float, step: float) -> list[float]:
+    """Times, s, at which the rows of the loops lose rank, accurate to a fraction of the step, s.
+
+    The motion until ``until``, s, is integrated by Runge-Kutta 4 with a fixed rank, which passes singular poses.
+    """
+    equations = JointCoordinates(mechanism)
+    if not (mechanism.loops and equations.rank):
+        return []
+    times = np.linspace(0.0, until, max(round(until / step), 5) + 1)
+    return _passed(equations, times, (y[: mechanism.nq] for y in equations.rk4_states(times, float(times[1]))))
+
+
+def singular_poses_of(form: ClosedForm, equations: JointCoordinates, until: float) -> list[float]:
+    """Times, s, of singular poses along a motion in closed form until ``until``, s."""
+    if not (equations.mechanism.loops and equations.rank) or form.motion is None or not until:
+        return []
+    fastest = float(np.abs(form.motion(np.linspace(0.0, until, _FEW))[1]).max())
+    times = np.linspace(0.0, until, int(np.clip(until * fastest / _TURN, _FEW, _MOST)) + 1)
+    return _passed(equations, times, form.motion(times)[0])
+
+
+def branching(times: list[float]) -> str:
+    """Clause about the times of singular poses, s; empty without any."""
+    instants = ", ".join(f"{time:.4g}" for time in times[:3]) + (", …" if len(times) > 3 else "")
+    return f"near t = {instants} s {BRANCHING}" if times else ""
+
+
+def _passed(equations: JointCoordinates, times: Array, poses: Iterable[Array]) -> list[float]:
+    sign, times_passed, last_value = RowSign(equations.rank), [], 0.0
+    for k, q in enumerate(poses):
+        C = equations.rows(q).C
+        smallest = float(singular_values(C)[equations.rank - 1])
+        if sign.changes(C):  # zero of the line through both values, with opposite signs
+            times_passed.append(float(times[k - 1] + (times[k] - times[k - 1]) * last_value / (last_value + smallest)))
+        last_value = smallest
+    return times_passed

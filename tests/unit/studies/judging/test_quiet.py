@@ -9,7 +9,7 @@ import proofroll
 from proofroll.core.events import events_of
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.judging.quiet import quiet
+from proofroll.studies.judging.reference import quiet
 
 
 @pytest.mark.drill

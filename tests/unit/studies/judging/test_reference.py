@@ -17,7 +17,7 @@ from proofroll.core.verdict import Allowance, RunCurve, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.reduced import Reduced
-from proofroll.papers.blajer_2006.truth.rolling import reduced
+from proofroll.papers.blajer_2006.truth.plug_in import reduced
 from proofroll.running.identity import resolve
 from proofroll.studies.answer.judged_run import errors_of
 from proofroll.studies.judging import run_values

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from mechanism_scenes import mechanism_named
 
-from proofroll.truth.bodies.body_elimination import BodySystem
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.bodies.maximal_equations import FUNCTIONS
+from proofroll.truth.bodies.maximal_taylor import BodySystem
 from proofroll.truth.numerics.elimination import Row, eliminated
 
 

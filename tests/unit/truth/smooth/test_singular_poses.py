@@ -15,8 +15,7 @@ from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.truth.numerics.hybrid import follow
 from proofroll.truth.plug_in import MechanismTruth
-from proofroll.truth.smooth.singular_poses import BRANCHING, singular_poses
-from proofroll.truth.smooth.smooth_truth import find_truth
+from proofroll.truth.smooth.smooth_truth import BRANCHING, find_truth, singular_poses
 from proofroll.truth.tree.contact_tree import ContactTree
 from proofroll.truth.truth_of_mechanism import truth_of
 from proofroll.truth.witnesses.closed_forms import closed_form

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.arrays import uneven
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contact.distributions import best_distribution, cones_of
-from proofroll.elements.mechanism.contact.lemke import lemke
 from proofroll.elements.mechanism.contact.one_contact import AT_BOUND, ModeKind, force_of_one, rubbing
 from proofroll.elements.mechanism.contact.rolling_and_spin import Presser
 from proofroll.elements.mechanism.dynamics.analysis import RANK
@@ -367,3 +367,41 @@ def robust_forces(
 def least_motion_for(W: Array, K: Array, violation: Array) -> Array:
     """Motion of least kinetic energy that makes these violations of rows K, (nv)."""
     return np.asarray(W @ K.T @ (np.linalg.pinv(K @ W @ K.T, RANK, hermitian=True) @ violation))
+
+
+_PIVOTS = 50  # at most, for each unknown
+_ZERO = 1e-12  # entries of the tableau, relative to the largest of their column, that count as zero
+
+
+def lemke(M: Array, q: Array) -> Array | None:
+    """Solution z, shape (n,), of a linear complementarity problem; None: the method ends on a ray."""
+    n = len(q)
+    scale = float(np.abs(q).max(initial=0.0))
+    if q.min(initial=0.0) >= 0:
+        return np.zeros(n)
+    # w − M z − d z0 = q; the entries of d differ, so that no two rows leave at once where contacts are alike
+    d = uneven(n)
+    tableau = np.column_stack([np.eye(n), -M, -d, q / scale])
+    basis = list(range(n))  # w is 0 … n − 1, z is n … 2n − 1, z0 is 2n
+    row, entering = int(np.argmin(tableau[:, -1] / d)), 2 * n
+    for _ in range(_PIVOTS * n):
+        leaving = basis[row]
+        tableau[row] /= tableau[row, entering]
+        others = np.arange(n) != row
+        tableau[others] -= np.outer(tableau[others, entering], tableau[row])
+        basis[row] = entering
+        if leaving == 2 * n:
+            break
+        entering = leaving + n if leaving < n else leaving - n
+        column = tableau[:, entering]
+        able = np.flatnonzero(column > _ZERO * np.abs(column).max())
+        if not len(able):
+            return None
+        ratios = np.maximum(tableau[able, -1], 0.0) / column[able]
+        ties = able[ratios <= ratios.min() + _ZERO]
+        row = next((int(k) for k in ties if basis[k] == 2 * n), int(ties[0]))
+    else:
+        return None
+    z = np.zeros(2 * n + 1)
+    z[basis] = tableau[:, -1]
+    return scale * np.maximum(z[n : 2 * n], 0.0)

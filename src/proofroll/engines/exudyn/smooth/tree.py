@@ -19,9 +19,9 @@ from proofroll.elements.mechanism.scene.rotations import Array, to_quaternion
 from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
-from proofroll.engines.exudyn.smooth.bushings import add_bushings
 from proofroll.engines.exudyn.smooth.connections import add_forces, add_springs
 from proofroll.engines.exudyn.smooth.joint_laws import JointLaws
+from proofroll.engines.exudyn.smooth.redundant import add_bushings
 
 _KNOWN = {MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC}
 _DRIVES = {MechanismCapability[name] for name in ("ACTUATORS", "SATURATION", "SIGNALS", "HELD")}

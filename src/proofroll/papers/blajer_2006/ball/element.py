@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.run.contacts.on_wall import BodyOnWall
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.run.optional_terms import RESISTANCE
 from proofroll.elements.mechanism.run.sampling import MechanismSample
-from proofroll.papers.blajer_2006.ball import failure, failure_program
+from proofroll.papers.blajer_2006.ball import failure_program
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,7 +91,7 @@ class EvenRolling(MechanismElement):
         "rolling resistance": Regularised(1e-6, "its moment is read back through a normal force, which a solver finds"),
         "inverse friction": Regularised(float("inf"), "a finite number stands for unbounded friction"),
     }
-    failures: ClassVar[Mapping[str, str]] = failure.MEANINGS
+    failures: ClassVar[Mapping[str, str]] = failure_program.MEANINGS
     askable: ClassVar[Mapping[str, str]] = {"orientation": MechanismCapability.ORIENTATION}
 
     @cached_property
@@ -130,11 +130,11 @@ class EvenRolling(MechanismElement):
 
     def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
         """See the protocol."""
-        return failure.signs(self._ball, dataset, truth)
+        return failure_program.signs(self._ball, dataset, truth)
 
     def cause(self, dataset: xr.Dataset, error: float) -> str | None:
         """See :class:`proofroll.core.element_abilities.ExplainsErrors`."""
-        return failure.cause(self._ball, dataset, error)
+        return failure_program.cause(self._ball, dataset, error)
 
     def failure_program(self, failed: FailedRun, engine: str | None) -> str:
         """See :class:`proofroll.core.element_abilities.WritesPrograms`."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from proofroll.papers.blajer_2006.figures import statement_tables
+from proofroll.papers.blajer_2006.figures import writing
 from proofroll.papers.blajer_2006.figures.reading import STUDY, load_figures
 from proofroll.report.parts import Part, PartEntry
 
@@ -30,7 +30,7 @@ class FiguresPart(Part):
     words: ClassVar[str] = "figures"
     command: ClassVar[str] = "paper figures {.name}"
     template: ClassVar[str] = "figures.html"
-    names: ClassVar[Mapping[str, Any]] = {"statements": statement_tables}
+    names: ClassVar[Mapping[str, Any]] = {"statements": writing}
     asked: Figures
     maps: dict[str, list[xr.Dataset]] = field(default_factory=dict)
     """Regime maps by the name of their study."""
@@ -44,7 +44,7 @@ class FiguresPart(Part):
     @staticmethod
     def line(entry: PartEntry) -> str:
         """Count of the statements that hold."""
-        return statement_tables.count(entry.study["statements"])
+        return writing.count(entry.study["statements"])
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
         """Makes the runs and regime maps."""

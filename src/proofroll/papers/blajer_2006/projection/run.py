@@ -1,26 +1,79 @@
 """Formulations ``euler`` and ``rotating_frame``: run of a ball by the projection method, as in the article."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from typing_extensions import override
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import presets_of
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.formulations import Formulation
+from proofroll.core.heyoka_library import TIGHTEST, require_heyoka
 from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 from proofroll.engines.projection.adapter import ELIMINATION
+from proofroll.engines.projection.settings import ProjectionSettings
 from proofroll.papers.blajer_2006.ball.as_body import RunOnBody, on_body, rolling_ball
+from proofroll.papers.blajer_2006.ball.compiled.projection import Formulation as Unknowns
+from proofroll.papers.blajer_2006.ball.compiled.projection import parameters, projected, structure
+from proofroll.papers.blajer_2006.ball.compiled.series import Renewed, Series, still_moving
 from proofroll.papers.blajer_2006.ball.model import ALL_OF_A_BALL, NO_OTHER_BODIES, RollingBall
 from proofroll.papers.blajer_2006.ball.sampling import BallBuilt, BallSample, terms_held
 from proofroll.papers.blajer_2006.projection.geometry import Uniform, matrix
 from proofroll.papers.blajer_2006.projection.method import ProjectedBall, start_and_scales
 from proofroll.papers.blajer_2006.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
-from proofroll.papers.blajer_2006.projection.settings import PRESETS, ProjectionBallSettings
-from proofroll.papers.blajer_2006.projection.taylor import TaylorSeries
+
+
+@dataclass(frozen=True)
+class ProjectionBallSettings(ProjectionSettings):
+    """Settings of the projection method for a ball.
+
+    In ``rotating_frame`` no step leaves a violation of the rolling constraints, for there they are linear with constant
+    coefficients, but round-off does, and it grows.
+
+    Attributes:
+        formulation: ``euler``, the paper's angles, with a singularity, or ``rotating_frame``, the angular velocity
+            along the local axes, without. The angles are always part of the equations; in the rotating frame the
+            orientation is followed, as a quaternion, only for a scene that asks for it.
+        singularity: action of ``euler`` near θ = 0 and π: ``renew``, choose the body's axes anew and say so, or
+            ``stop``, as the paper's equations do by themselves.
+    """
+
+    formulation: Literal["euler", "rotating_frame"] = "euler"
+    singularity: Literal["renew", "stop"] = "renew"
+
+    @override
+    def _rules(self) -> Iterator[tuple[bool, str, str]]:
+        yield from super()._rules()
+        advice = "only mechanisms have compiled equations; leave it out, or take integrator=taylor"
+        yield self.equations == "compiled", "equations", advice
+        advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
+        yield self.singularity == "stop" and self.formulation != "euler", "singularity", advice
+
+    @property
+    @override
+    def unused(self) -> tuple[str, ...]:
+        without = () if self.formulation == "euler" else ("singularity",)
+        return (*super().unused, *without, "equations")
+
+
+_SETTINGS: Mapping[str, Mapping[str, object]] = {
+    "default": {"integrator": "rk4"},
+    "matched": {},
+    "tuned": {"integrator": "taylor", "rtol": TIGHTEST},
+}
+
+
+PRESETS: Mapping[str, Mapping[str, ProjectionBallSettings]] = presets_of(
+    ProjectionBallSettings, dict.fromkeys(("euler", "rotating_frame"), _SETTINGS)
+)
+
 
 # Components of the state without the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7
@@ -160,3 +213,55 @@ FORMULATIONS: Mapping[str, Formulation] = {
     )
     for name, presets in PRESETS.items()
 }
+
+
+class TaylorSeries(Series):
+    """Motion of a ball that rolls without slip, in the state x = [q, s], with steps as long as the tolerance allows.
+
+    A step is exact to the last digits, and the equations keep C v constant, so only round-off violates the constraints.
+    It accumulates over thousands of oscillations, and is removed like any other violation.
+    """
+
+    def __init__(
+        self,
+        body: RollingBall,
+        formulation: Unknowns,
+        x: FloatArray,
+        rtol: float,
+        check: Callable[..., None],
+        accepted: Renewed,
+    ) -> None:
+        """Starts at time 0 in the state x, with the relative tolerance ``rtol`` of a step [1].
+
+        After each step ``check`` is called with time [s] and state, and raises Diverged if it is not reliable;
+        ``accepted`` gives the state from which the motion goes on, see ``Renewed`` of :mod:`compiled.series`.
+
+        Raises:
+            Missing: heyoka is not installed.
+        """
+        require_heyoka("integrator=taylor")
+        model = projected(structure(body, formulation), rtol)
+        self._pars, self._evaluate = parameters(body), model.evaluate
+        self._trust, self._resistance = check, body.contact.rolling_resistance > 0
+        self._scales, self._mass = np.array(body.surface.length_scales), body.ball.mass
+        pars = np.array(self._pars[: len(model.integrator.pars)])
+        super().__init__(model.integrator, pars, x, self._look, accepted)
+
+    def _look(self, old_state: FloatArray, t: float, x: FloatArray) -> None:
+        self._trust(t, x)
+        if self._resistance:
+            still_moving(self._along(old_state), t, self._along(x))
+
+    def _along(self, x: FloatArray) -> FloatArray:
+        """Velocity of the centre along the coordinates [m/s], shape (2,)."""
+        return np.asarray(x[-5:-3] * self._scales)
+
+    @property
+    def rates(self) -> FloatArray:
+        """Present time derivative ẋ."""
+        return self._evaluate(self.x, self._pars)[:-3]
+
+    @property
+    def force(self) -> FloatArray:
+        """Present force of the wall on the ball in local axes, (-N, -λ1, -λ2) [N], shape (3,)."""
+        return -self._mass * self._evaluate(self.x, self._pars)[-3:]

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from proofroll.truth.check.laws.contacts import gap_of
 from proofroll.truth.check.laws.integrals import TO_SERIES
+from proofroll.truth.check.laws.motion import Turns, changed_velocity
 from proofroll.truth.check.laws.record import Array, BodyPoses, PublishedEvent, PublishedValues
 from proofroll.truth.check.laws.residuals import STRUCK, LawResiduals
 from proofroll.truth.check.laws.samples import NOISE, kinetic_energy
 from proofroll.truth.check.laws.scene import LawScene
-from proofroll.truth.check.laws.tiled import Turns, changed_velocity
 from proofroll.truth.check.laws.tiles import Tiles
 from proofroll.truth.check.laws.values import energy_of
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from proofroll.elements.mechanism.contact.lemke import lemke
+from proofroll.elements.mechanism.contact.coulomb import lemke
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -19,9 +19,8 @@ from proofroll.papers.blajer_2006.figures.definition import Figures
 from proofroll.papers.blajer_2006.figures.drawing import drawn, inline, picture
 from proofroll.papers.blajer_2006.figures.judging import judgements, rounds_to
 from proofroll.papers.blajer_2006.figures.reading import load_figures
-from proofroll.papers.blajer_2006.figures.statement_tables import count
 from proofroll.papers.blajer_2006.figures.study import FigureRuns, run_figures
-from proofroll.papers.blajer_2006.figures.writing import write_figures
+from proofroll.papers.blajer_2006.figures.writing import count, write_figures
 from proofroll.report.figure import styled
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
