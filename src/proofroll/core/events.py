@@ -1,18 +1,26 @@
-"""Events of a run, each with a bracket in time."""
+"""Events of a run, each with a bracket in time; closed lists of texts, as their kinds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proofroll.core.columns import Columns, Variable
-from proofroll.core.kinds import Kind
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+class Kind(StrEnum):
+    """A text of a closed list; it equals the plain text, and programs, JSON and messages show it as that."""
+
+    def __repr__(self) -> str:
+        return repr(self.value)
+
 
 # Name of an observable for kinds of elements with events: how many events differ in kind from the truth's, are missing
 # or are too many.

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.kinds import Kind
+from proofroll.core.events import Kind
 
 
 class JointKind(Kind):
