@@ -32,7 +32,7 @@ def scene_answer(*engines: EngineAnswer, scene: str = "sphere_in_cylinder", tole
     """An answer for a scene."""
     return SceneAnswer(
         scene=scene, parameters={"speed": 3.0}, until=2.0, every=0.02, tolerance=tolerance, bounds=[BOUND],
-        unjudged=["attitude"], beyond="", open="",
+        unjudged=["attitude"], changes=[], beyond="", open="",
         engines=list(engines), spent=9.0, measured=Measured("2026", {}, {}, ""),
     )  # fmt: skip
 

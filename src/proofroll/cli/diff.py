@@ -18,8 +18,7 @@ def diff(
     scenes: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Of versions: scenes and comparisons; by default all comparisons.",
-            callback=options.own_first,
+            help="Of versions: scenes and comparisons; by default all comparisons.", callback=options.own_first
         ),
     ] = None,
     _root: options.Root = None,

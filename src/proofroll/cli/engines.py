@@ -92,10 +92,9 @@ def add(
     """
     from proofroll.core.plugins import engine_names
     from proofroll.running.make_environment import add as made
+    from proofroll.running.make_environment import example_packages, install
 
     if not requirement and name.isidentifier() and name not in engine_names():
-        from proofroll.running.example_packages import example_packages, install
-
         with options.spinner(f"{name}: installing its package"):
             version, folder = install(name, example_packages())
         sys.stdout.write(f"{name}: version {version}, installed from {folder}\n")

@@ -21,7 +21,7 @@ def findings(
     """Run the programs of the findings: which still show. They run with the installed engines."""
     import dataclasses
 
-    from proofroll.report.terminal.findings import findings_list, findings_table
+    from proofroll.report.terminal.tables import findings_list, findings_table
     from proofroll.studies.findings import FindingState, load_findings, run_findings
 
     chosen = load_findings(engine or [])

@@ -73,7 +73,7 @@ def answer_steps(
         keep_study(answers[engine], paths[engine])
     made = [answer for engine in engines if (answer := answers[engine]) is not None]
     if as_json:
-        content = [{"sentence": step_sentence(item), **plain(item)} for item in made]
+        content = [{"sentence": step_sentence(item), "scope": scope_sentence(item), **plain(item)} for item in made]
         options.write_json(content[0] if len(content) == 1 else content)
     else:
         lines = [f"{head}{step_sentence(item)}" for head, item in zip(heads, made, strict=True)]

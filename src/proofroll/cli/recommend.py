@@ -42,8 +42,7 @@ def recommend(
     until: options.Until = None,
     forces: Annotated[bool, typer.Option("--forces", help="Forces count as the motion does.")] = False,
     lines: Annotated[
-        bool,
-        typer.Option("--lines", help="Print only the lines that make the choice in a model of your own."),
+        bool, typer.Option("--lines", help="Print only the lines that make the choice in a model of your own.")
     ] = False,
     plot: Annotated[
         Path | None, typer.Option(help="Draw error against cost of all runs of the search into this file, *.svg.")
@@ -60,7 +59,7 @@ def recommend(
     what that leaves open is named. Exit 1 if nothing holds the tolerance, 3 if no engine could be tried.
     """
     from proofroll.files.json_data import plain
-    from proofroll.report.answer.sentences import answer_lines, taken_sentence
+    from proofroll.report.answer.sentences import answer_lines, scope_sentence, taken_sentence
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.running.idle_workers import Workers
     from proofroll.studies.answer.question import question_named
@@ -83,7 +82,7 @@ def recommend(
     if plot is not None:
         _draw(made[0], plot)
     if as_json:
-        content = [{"sentence": taken_sentence(item), **plain(item)} for item in made]
+        content = [{"sentence": taken_sentence(item), "scope": scope_sentence(item), **plain(item)} for item in made]
         options.write_json(content[0] if len(content) == 1 else content)
     elif lines:
         _print_lines(made)

@@ -47,8 +47,7 @@ def run(
         str | None, typer.Option(help="Keep the run by this name: proofroll replay lists and shows what is kept.")
     ] = None,
     events: Annotated[
-        Path | None,
-        typer.Option(help="Write the events to this csv file, with energy and height of each bounce."),
+        Path | None, typer.Option(help="Write the events to this csv file, with energy and height of each bounce.")
     ] = None,
     time_limit: Annotated[
         float, typer.Option(help="Seconds after which the run is ended; a truth keeps what it has found.")

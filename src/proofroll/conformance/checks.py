@@ -12,7 +12,7 @@ from functools import cache, partial
 from typing import Any
 from unittest import SkipTest
 
-from proofroll.conformance import batches, building, declarations, motion, response
+from proofroll.conformance import building, declarations, motion, response
 from proofroll.conformance.subject import (
     Subject,
     UnlikeSceneError,
@@ -72,8 +72,8 @@ _OF_PRESETS: tuple[Callable[[Subject], None], ...] = (
 )
 # Checks that run once per formulation and preset of an engine that runs batches, and scenes of one structure.
 _OF_BATCHES: tuple[Callable[[Subject, Sequence[Scene]], None], ...] = (
-    batches.copies_move_as_runs,
-    batches.a_copy_that_overflows_stays_alone,
+    motion.copies_move_as_runs,
+    motion.a_copy_that_overflows_stays_alone,
 )
 
 

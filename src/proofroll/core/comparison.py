@@ -35,36 +35,43 @@ class Tolerance:
         return self.value * scale if self.relative else self.value
 
     @classmethod
-    def parse(cls, field_name: str, text: object) -> Tolerance:
-        """Reads ``"6e-5 m"`` or ``"0.1 %"``. Raises InputError for another form."""
-        number, _, unit = str(text).partition(" ")
-        try:
-            value = float(number)
-        except ValueError:
-            raise InputError(field_name, text, 'write a number and a unit, "6e-5 m", or "0.1 %" of the scale') from None
-        if not (math.isfinite(value) and value > 0 and unit.strip()):
-            raise InputError(field_name, text, 'write a positive number and a unit, "6e-5 m", or "0.1 %" of the scale')
-        return cls(value / 100, True) if unit.strip() == "%" else cls(value, False, unit.strip())
-
-    @classmethod
     def of_quantity(cls, field_name: str, text: object, unit: str) -> Tolerance:
         """Reads ``1e-3``, ``1e-3 m``, ``1 mm`` or ``1 %`` for a quantity in this unit.
 
         Raises:
             InputError: another form or unit.
         """
+        return cls.parse(field_name, text, unit).in_unit(field_name, unit)
+
+    @classmethod
+    def parse(cls, field_name: str, text: object, unit: str = "") -> Tolerance:
+        """Reads ``6e-5 m``, ``1 mm`` or ``0.1 %``, in the unit that is written; a number alone has the given unit.
+
+        Raises:
+            InputError: another form, or no unit at all.
+        """
         match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*", str(text))
-        written_unit = (match[2] or unit) if match else unit
-        if written_unit not in {unit, "%"} and (written_unit[1:] != unit or written_unit[0] not in _PREFIXES):
-            raise InputError(field_name, text, f"its unit is {unit}")
+        written = (match[2] or unit) if match else ""
         try:
-            if match is None:
-                raise ValueError
-            number = match[1] if written_unit in {unit, "%"} else f"{float(match[1]) * _PREFIXES[written_unit[0]]:.17g}"
-            return cls.parse(field_name, f"{number} {written_unit if written_unit == '%' else unit}")
-        except (InputError, ValueError):
-            advice = f"write a positive number and a unit: 1e-3 {unit}, or 1 % of the scale"
-            raise InputError(field_name, text, advice) from None
+            value = float(match[1]) if match and written else math.nan
+        except ValueError:
+            value = math.nan
+        if not 0 < value < math.inf:
+            advice = f"write a positive number and a unit: 1e-3 {unit or 'm'}, or 1 % of the scale"
+            raise InputError(field_name, text, advice)
+        return cls(value / 100, True) if written == "%" else cls(value, False, written)
+
+    def in_unit(self, field_name: str, unit: str) -> Tolerance:
+        """The same in a unit from which its own differs by a prefix at most: ``1 mm`` in m.
+
+        Raises:
+            InputError: another unit.
+        """
+        if self.relative or self.unit == unit:
+            return self
+        if self.unit[1:] != unit or self.unit[0] not in _PREFIXES:
+            raise InputError(field_name, f"{self.value:g} {self.unit}", f"its unit is {unit}")
+        return Tolerance(self.value * _PREFIXES[self.unit[0]], False, unit)
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,8 @@ BETWEEN = "between"
 ENDS, ENDED = "ends", "ended"
 # Attribute of a reference by steps: the engine and formulation of its steps, as a setting; it is no truth.
 BY_STEPS = "by_steps"
+# Attribute of a truth with the times at which what acts changes [s], also where no event is told.
+BORDERS = "borders"
 HORIZON = "horizon_words"  # attribute of a reference by steps: how far it tells the motion, a clause
 BARS = "error_bars"  # attribute of a variable: times [s], each with its error bar from there on, in one flat list
 LAWS = "laws"  # attribute of a truth: outcome of its law check, a clause

@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -94,13 +95,15 @@ def _checked(path: Path, content: dict[str, Any]) -> Comparison:
             if isinstance(value, Edge) and not -math.inf < value.edge_between[0] < value.edge_between[1] < math.inf:
                 raise InputError(f"points.{index}.{name}", list(value.edge_between), "give the lower value first")
     observables = load_scene(comparison.scene).observables
-    for name, band in comparison.bands.items():
-        _check_bounds(f"{place}: tolerances.{name}", observables, band.bounds)
-    for index, row in enumerate(comparison.rows):
-        _check(f"{place}: rows.{index}", row, comparison, observables)
+    for name, band in bands.items():
+        bands[name] = replace(band, bounds=_in_units(f"{place}: tolerances.{name}", observables, band.bounds))
+    rows = [
+        _checked_row(f"{place}: rows.{index}", row, comparison, observables)
+        for index, row in enumerate(comparison.rows)
+    ]
     _check_times(comparison)
     _check_brief(place, comparison)
-    return comparison
+    return replace(comparison, bands=bands, rows=rows)
 
 
 def _check_brief(place: str, comparison: Comparison) -> None:
@@ -154,18 +157,18 @@ def _prepared(place: str, content: object) -> dict[str, Any]:
     return row
 
 
-def _check(place: str, row: Row, comparison: Comparison, observables: Mapping[str, Observable]) -> None:
-    """Checks of a row that its types do not express."""
+def _checked_row(place: str, row: Row, comparison: Comparison, observables: Mapping[str, Observable]) -> Row:
+    """A row with its bounds in the units of the scene, after checks that its types do not express."""
     _check_engine(place, row)
     require_known(f"{place}.tolerance", row.tolerance, comparison.bands)
     if row.ladder != [1.0]:
         _check_ladder(place, row.ladder)
     _check_expectations(place, row)
-    _check_bounds(place, observables, dict.fromkeys([*row.expect_for, *row.order]))
+    for name in [*row.expect_for, *row.order]:
+        _require_observable(place, name, observables)
     for name, pair in row.order.items():
         require_pair(f"{place}.order.{name}", pair)
-    _check_bounds(place, observables, row.limit)
-    _check_bounds(place, observables, row.bound)
+    limit, bound = (_in_units(place, observables, bounds) for bounds in (row.limit, row.bound))
     _check_points(f"{place}.only", comparison, row.only)
     if len(row.short.split()) > _SHORTEST:
         advice = f"it is shown on a card and has {len(row.short.split())} words; say it in {_SHORTEST}"
@@ -176,6 +179,7 @@ def _check(place: str, row: Row, comparison: Comparison, observables: Mapping[st
             raise InputError(f"{place}.except_at", exception.where, "name values that some point of the comparison has")
     if not comparison.combinations(row.only):
         raise InputError(f"{place}.only", row.only, "no point of the comparison fits, so the row would never be run")
+    return replace(row, limit=limit, bound=bound)
 
 
 def _check_engine(place: str, row: Row) -> None:
@@ -221,16 +225,21 @@ def _check_ladder(place: str, ladder: list[float]) -> None:
         raise InputError(f"{place}.ladder", ladder, "neighbouring factors must have the same ratio")
 
 
-def _check_bounds(place: str, observables: Mapping[str, Observable], bounds: Mapping[str, Tolerance | None]) -> None:
-    """Raises InputError unless every name is an observable of the scene, and every tolerance has its unit."""
+def _require_observable(place: str, name: str, observables: Mapping[str, Observable]) -> None:
+    require_known(f"{place}: observable", name, observables, "there is no such observable; choose from")
+
+
+def _in_units(
+    place: str, observables: Mapping[str, Observable], bounds: Mapping[str, Tolerance]
+) -> dict[str, Tolerance]:
+    """Bounds in the units of their observables; raises InputError for an unknown name, another unit, or no size."""
     for name, bound in bounds.items():
-        require_known(f"{place}: observable", name, observables, "there is no such observable; choose from")
-        if bound is not None and bound.relative and observables[name].floor is None:
+        _require_observable(place, name, observables)
+        if bound.relative and observables[name].floor is None:
             raise InputError(
                 f"{place}: {name}", "%", f"it has no size of its own; give a number in {observables[name].unit}"
             )
-        if bound is not None and not bound.relative and bound.unit != observables[name].unit:
-            raise InputError(f"{place}: {name}", bound.unit, f"its unit is {observables[name].unit}")
+    return {name: bound.in_unit(f"{place}: {name}", observables[name].unit) for name, bound in bounds.items()}
 
 
 strict(Comparison, Row, ExceptAt)

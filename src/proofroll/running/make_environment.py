@@ -1,4 +1,4 @@
-"""Makes the environment of an engine in another version: a virtual environment with the engine and this proofroll."""
+"""Makes environments with other versions of an engine and this proofroll, and installs packages of a checkout."""
 
 import contextlib
 import importlib.util
@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 import sys
+import tomllib
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from importlib import metadata
@@ -14,6 +15,7 @@ from pathlib import Path
 from proofroll.core.entry_points import announced
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import GROUP, distribution_of, engine_names, package_of, release
+from proofroll.core.source_code import OWN
 from proofroll.running import environments
 from proofroll.running.bound_program import printed_by
 from proofroll.running.engine_questions import describe
@@ -22,6 +24,7 @@ from proofroll.running.process import environment_of_another
 
 _PINNED = re.compile(r"\s*([\w.-]+)(?:\[[^\]]*\])?\s*==\s*(\w[\w.+-]*)\s*")
 _VERSIONS = re.compile(r"\(from versions: (?:[^)]*, )?((?:[^,)]+, ){2}[^,)]+)\)")  # in an error message of pip
+_PACKAGES = "examples/engines"
 _WORDS = 400  # length of the end of pip's message that is shown [characters]
 
 
@@ -182,3 +185,29 @@ def output_of(command: Sequence[str | Path]) -> str:
         what = " ".join(str(item) for item in command[1:4] if str(item).isascii() and len(str(item)) < 20)
         raise ProofrollError(f"{program} {what} failed ({code}): {words}")
     return printed
+
+
+def example_packages(source: Path = OWN.parents[1]) -> dict[str, Path]:
+    """Name of an engine -> folder of its package below a checkout of the source; empty where there is no checkout."""
+    folders: dict[str, Path] = {}
+    for file in sorted(source.glob(f"{_PACKAGES}/*/pyproject.toml")):
+        points = tomllib.loads(file.read_text(encoding="utf-8"))["project"].get("entry-points", {})
+        folders |= dict.fromkeys(points.get(GROUP, {}), file.parent)
+    return folders
+
+
+def install(name: str, packages: dict[str, Path]) -> tuple[str, Path]:
+    """Installs the package of an engine into this Python: version of the engine, and folder of the package.
+
+    Raises:
+        InputError: there is no such package here.
+        ProofrollError: pip refused it, or the engine does not start.
+    """
+    if name not in packages:
+        choices = (
+            f"choose one of {', '.join(packages)}" if packages else "a checkout of the source has packages of more"
+        )
+        advice = f"{choices} ({_PACKAGES}), or say by --requirement what to install"
+        raise InputError("engine", name, advice)
+    output_of([sys.executable, "-m", "pip", "install", "--quiet", str(packages[name])])
+    return describe(f"{name}@{sys.executable}").version, packages[name]

@@ -62,6 +62,7 @@ class TwoRouteMotion:
         routes: names of the routes, the one of the record first.
         checked_by: title of a closed form for a part of the motion, and its largest difference from the record.
         events: switches along the motion.
+        borders: times of all changes of what acts [s], also where a contact passes from a face to an edge.
         reason: cause why the question is ill-posed from the horizon on.
         end: time from which the motion is not known, s; the record ends before it; inf: it reaches all times asked for.
         ended: reason why it ends there, as a clause.
@@ -83,6 +84,7 @@ class TwoRouteMotion:
     routes: tuple[str, ...]
     checked_by: tuple[str, float] | None
     events: Sequence[Event] = ()
+    borders: Sequence[float] = ()
     reason: str = f"a start moved by {NUDGE:.1g} leads elsewhere: the motion is chaotic"
     pressed: Array | None = None
     end: float = np.inf

@@ -213,6 +213,7 @@ def two_route_motion(
         routes=routes,
         checked_by=None,
         events=happened,
+        borders=[stretch.start * units.time for stretch in paths[0].stretches[1:]],
         reason=reason,
         pressed=routed[0].pressed,
         sums=routed[0].sums,

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounces import with_bounces
 from proofroll.core.columns import Columns
-from proofroll.core.dataset import ENDED, ENDS, LAWS
+from proofroll.core.dataset import BORDERS, ENDED, ENDS, LAWS
 from proofroll.core.element import Element
 from proofroll.core.errors import NotUnique
 from proofroll.core.events import with_events
@@ -147,6 +147,8 @@ class MechanismTruth:
             dataset.attrs["second_route"] += f", {motion.checked_by[0]}"
         if motion.laws:
             dataset.attrs[LAWS] = motion.laws
+        if motion.borders:
+            dataset.attrs[BORDERS] = np.array(motion.borders)
         notes = [branches]
         if np.isfinite(motion.horizon):
             dataset.attrs["horizon"] = motion.horizon

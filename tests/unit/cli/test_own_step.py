@@ -65,8 +65,8 @@ def test_a_step_that_is_not_confirmed_is_no_line_to_change() -> None:
     advised = replace(HELD, spec="mujoco[formulation=joints,dt=1e-7]", state=State.UNCONFIRMED)
     made = StepAnswer(
         scene="pendulum", parameters={}, until=5.0, every=0.02, tolerance="1 mm", bounds=[BOUND], unjudged=[],
-        beyond="", open="", spec="mujoco[dt=0.002]", resolution="dt", step=2e-3, holds=False, luck="", bound=BOUND,
-        error=1.0, status="done", message="", reached=5.0, held_until=0.1, seconds_per_second=1 / 160,
+        changes=[], beyond="", open="", spec="mujoco[dt=0.002]", resolution="dt", step=2e-3, holds=False, luck="",
+        bound=BOUND, error=1.0, status="done", message="", reached=5.0, held_until=0.1, seconds_per_second=1 / 160,
         advised=advised, spent=1.0, measured=Measured("2026", {}, {}, ""),
     )  # fmt: skip
     command = "proofroll recommend pendulum --engine mujoco --tolerance '1 mm' --until 5.0 --lines"

@@ -152,7 +152,16 @@ def test_a_tolerance_of_a_quantity_has_its_unit(text: object, unit: str, value: 
         Tolerance.of_quantity("x", "1 lb", unit)
 
 
-@pytest.mark.parametrize("text", ["6e-5", "m", "", "6e-5m", "0 m", "-1 m", "nan m", "inf m", "1 ", 6e-5, None])
+def test_a_file_takes_the_tolerances_of_the_command_line(load: Callable[..., Comparison]) -> None:
+    """Bounds, limits and bounds of one row may have a prefix, as ``1 mm``; they are kept in the scene's unit."""
+    assert load('z = "1e-10 m"', 'z = "1 mm"').bands["tight"].bounds["z"] == Tolerance(1e-3, False, "m")
+    assert load('limit = { z = "3e-5 m" }', 'limit = { z = "30 µm" }').rows[1].limit["z"].absolute(1) == pytest.approx(
+        30e-6
+    )
+    assert load('bound = { F3 = "2 %" }', 'bound = { F3 = "2 kN" }').rows[1].bound["F3"].absolute(1) == 2e3
+
+
+@pytest.mark.parametrize("text", ["6e-5", "m", "", "1.2.3 m", "0 m", "-1 m", "nan m", "inf m", "1 ", 6e-5, None])
 def test_tolerances_of_another_form(text: object) -> None:
     """A tolerance without number or unit, or that is not positive, gives one line that shows the form."""
     with pytest.raises(InputError, match=r"write a (positive )?number and a unit") as caught:
@@ -207,10 +216,10 @@ def test_tolerances_of_another_form(text: object) -> None:
         (SOFT, f"{SOFT}\nexcept_at = 3", ["rows.1.except_at = 3"]),
         (SOFT, f"{SOFT}\nexcept_at = [{{ where = {{ speed = [4] }} }}]", ["rows.1.except_at.0.expect", "required"]),
         (FIRST, excepted("speed = [4]", '"differs"', FIRST), ["rows.0.because", "needs its reason"]),
-        ('z = "1e-10 m"', 'z = "1e-10 mm"', ["tolerances.tight: z = 'mm'", "its unit is m"]),
-        ('N = "0.1 %"', 'gamma = "5e-3 m"', ["tolerances.tight: gamma = 'm'", "its unit is rad"]),
-        ('limit = { z = "3e-5 m" }', 'limit = { z = "3e-5 s" }', ["rows.1: z = 's'", "its unit is m"]),
-        ('bound = { F3 = "2 %" }', 'bound = { F3 = "2 kN" }', ["rows.1: F3 = 'kN'", "its unit is N"]),
+        ('z = "1e-10 m"', 'z = "1e-10 ms"', ["tolerances.tight: z = '1e-10 ms'", "its unit is m"]),
+        ('N = "0.1 %"', 'gamma = "5e-3 m"', ["tolerances.tight: gamma = '0.005 m'", "its unit is rad"]),
+        ('limit = { z = "3e-5 m" }', 'limit = { z = "3e-5 s" }', ["rows.1: z = '3e-05 s'", "its unit is m"]),
+        ('bound = { F3 = "2 %" }', 'bound = { F3 = "2 lb" }', ["rows.1: F3 = '2 lb'", "its unit is N"]),
         ('N = "0.1 %"', 'first_slip = "1 %"', ["tolerances.tight: first_slip = '%'", "no size of its own", "in s"]),
         ('bound = { F3 = "2 %" }', 'bound = { event_times = "2 %" }', ["rows.1: event_times = '%'", "in s"]),
         ("speed = [2, 4]", f"speed = {list(range(1, 9000))}", ["claim.toml: vary", "more than 10000 points"]),

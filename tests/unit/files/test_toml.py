@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from proofroll.core.errors import InputError
 from proofroll.files import toml as toml_file
-from proofroll.files.toml import read_toml, study_files, study_of
+from proofroll.files.toml import read_toml, study_files, study_of, toml_text
 from proofroll.studies.stability.claims import file_for
 
 
@@ -44,3 +46,19 @@ def test_a_broken_neighbour_costs_nobody_else(tmp_path: Path, monkeypatch: pytes
     assert [(path.name, content["scene"]) for path, content in study_files("made")] == [("b.toml", "cone")]
     without = file_for("pendulum")  # its own parameters are the axes
     assert (without.scene, without.claims) == ("pendulum", [])
+
+
+def test_written_tables_are_read_as_they_were() -> None:
+    """Numbers to the last digit, texts with quotes, bools, lists, tables, tables in rows and lists of tables."""
+    content = {
+        "title": 'a "quoted" \\ text\nof two lines, µ',
+        "number": 0.1 + 0.2,
+        "rate": 1e-300,
+        "whole": 3,
+        "true": True,
+        "empty": [],
+        "gravity": {"direction": [0.0, -1.0, 0.0]},
+        "bodies": [{"name": "a", "inertia": [[1.0, 0.0], [0.0, 1.0]]}, {"name": "b"}],
+        "pairs": [{"friction": {"static": 0.5, "kinetic": 0.3}}, {"friction": math.inf}],
+    }
+    assert tomllib.loads(toml_text(content)) == content

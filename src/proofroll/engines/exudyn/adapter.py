@@ -16,8 +16,8 @@ from proofroll.elements.mechanism.run.sampling import mechanism_of
 from proofroll.engines.exudyn.contact import discs, spheres
 from proofroll.engines.exudyn.contact.discs import Discs
 from proofroll.engines.exudyn.contact.spheres import Spheres
+from proofroll.engines.exudyn.integration import own_lines
 from proofroll.engines.exudyn.native import exu
-from proofroll.engines.exudyn.own_lines import own_lines
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
 from proofroll.engines.exudyn.smooth import redundant, tree
 from proofroll.engines.exudyn.smooth.redundant import Redundant

@@ -1,8 +1,8 @@
-"""Exudyn's own implicit time integration, driven from sample to sample without losing its state."""
+"""Exudyn's own time integration, driven from sample to sample without losing its state, and its settings as lines."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,15 @@ from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.engines.exudyn.native import ExudynError, exu, new_settings
 from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
+
+# Settings that say what a run writes and how long it is.
+_OF_A_RUN = (
+    "solution",
+    "parallel",
+    "timeIntegration.endTime",
+    "timeIntegration.numberOfSteps",
+    "timeIntegration.verbose",
+)
 
 
 def new_system() -> tuple[Any, Any]:
@@ -225,3 +234,34 @@ def consistent_start(
 def _sentence(text: object) -> str:
     """Message of Exudyn on one line, without the Python traceback that it appends."""
     return " ".join(str(text).partition("\n\nAt:")[0].split())
+
+
+def own_lines(settings: ExudynSettings) -> list[str]:
+    """See :class:`proofroll.core.engine_abilities.TellsLines`: what differs from a new ``exu.SimulationSettings()``."""
+    usual = dict(_leaves(exu.SimulationSettings().GetDictionary()))
+    made = dict(_leaves(simulation_settings(settings, dependent=settings.formulation == "redundant").GetDictionary()))
+    lines = [
+        f"simulationSettings.{name} = {_literal(value)}"
+        for name, value in made.items()
+        if value != usual.get(name) and not name.startswith(_OF_A_RUN)
+    ]
+    steps = f"round(simulationSettings.timeIntegration.endTime / {settings.dt!r})"
+    lines.append(f"simulationSettings.timeIntegration.numberOfSteps = {steps}")
+    if settings.integrator not in EXPLICIT:
+        lines.append("# newton.absoluteTolerance: as many times that as kilograms move, of more than 1 kg")
+    if settings.stiffness is not None:
+        lines.append(f"# contact: stiffness {settings.stiffness:g} N/m, friction zone {settings.friction_zone:g} m/s")
+    return lines
+
+
+def _leaves(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{above}{name}.")
+        else:
+            yield above + name, value
+
+
+def _literal(value: Any) -> str:
+    """Python text of a value; of an enumeration the name that a program writes."""
+    return f"exu.{type(value).__name__}.{value.name}" if hasattr(value, "name") else repr(value)

@@ -30,22 +30,13 @@ class Mujoco:
     title: ClassVar[str] = "MuJoCo"
     witness: ClassVar[bool] = False
     oldest: ClassVar[str] = "3.5"  # the first version with mj_copyData, which every sample needs
-    provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "joints": mechanism.PROVIDES,
-        "geoms": mechanism_geoms.PROVIDES,
-    }
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"joints": mechanism.PROVIDES, "geoms": mechanism_geoms.PROVIDES}
     made_for: ClassVar[Mapping[str, frozenset[str]]] = {"geoms": frozenset({MechanismCapability.CONTACT})}
-    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "joints": mechanism.LACKING,
-        "geoms": mechanism_geoms.LACKING,
-    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"joints": mechanism.LACKING, "geoms": mechanism_geoms.LACKING}
     settings: ClassVar[type[Any]] = MujocoSettings
     lines = staticmethod(own_lines)
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
-    levels: ClassVar[Mapping[str, Level]] = {
-        "joints": Level.CONSTRAINT,
-        "geoms": Level.CONTACT,
-    }
+    levels: ClassVar[Mapping[str, Level]] = {"joints": Level.CONSTRAINT, "geoms": Level.CONTACT}
     references: ClassVar[Mapping[str, Steps]] = {"geoms": Steps(exact_cone=False, hard_contact=True)}
     terms: ClassVar[Sequence[Term]] = ()
 

@@ -11,10 +11,7 @@ from proofroll.core.engine import Scheme, presets_of
 from proofroll.core.errors import refuse_first
 from proofroll.elements.mechanism.run.capabilities import MechanismCapability
 
-_SCHEMES = {
-    "semi_implicit_euler": Scheme.SEMI_IMPLICIT_EULER,
-    "rk4": Scheme.RK4,
-}
+_SCHEMES = {"semi_implicit_euler": Scheme.SEMI_IMPLICIT_EULER, "rk4": Scheme.RK4}
 # Formulations of mechanisms, with their integrators.
 OF_MECHANISMS = {
     "null_space": ("rk4", "dop853"),

@@ -87,5 +87,5 @@ PRESETS: Mapping[str, Mapping[str, ProjectionSettings]] = {
         "default": ProjectionSettings("dependent", "default", "rk4"),
         "matched": ProjectionSettings("dependent", "matched", "dop853"),
         "tuned": ProjectionSettings("dependent", "tuned", "dop853", equations="compiled"),
-    },
+    }
 }

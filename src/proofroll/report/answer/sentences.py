@@ -15,6 +15,7 @@ from proofroll.report.run.last_values import FORCES
 from proofroll.running.case import Status
 from proofroll.studies.answer.records import (
     AllowedError,
+    AnsweredScene,
     EngineAnswer,
     SceneAnswer,
     SettingTried,
@@ -35,6 +36,8 @@ SIGNS = {
     State.NOT_RUN: ("·", "not run"),
 }
 _QUANTITIES = {"p_WB": "body positions"}
+# Most changes that are told by their times.
+_NAMED = 3
 # Least ratio of two speeds that is told.
 _FASTER = 1.1
 _PREFIXES = {-3: "m", -6: "µ", -9: "n"}
@@ -202,13 +205,24 @@ def unaided(made: SceneAnswer) -> EngineAnswer | None:
     return next((item for item in made.engines if item.holds and not item.brought), None)
 
 
-def scope_sentence(made: SceneAnswer | StepAnswer) -> str:
+def scope_sentence(made: AnsweredScene) -> str:
     """Sentence on what was judged, over which time, and that attitudes were not."""
     names = ", ".join(quantity_words(bound.quantity) for bound in made.bounds)
-    loads = ", forces after the start" if any(bound.unit in FORCES for bound in made.bounds) else ""
+    loads = f", {_forces_words(made)}" if any(bound.unit in FORCES for bound in made.bounds) else ""
     unjudged = f" Not judged: {' and '.join(made.unjudged)}." if made.unjudged else ""
     beyond = f" No longer: {made.beyond}." if made.beyond else ""
     return f"Judged: {names}, every {made.every:g} s over {made.until:g} s{loads}.{beyond}{unjudged}"
+
+
+def _forces_words(made: AnsweredScene) -> str:
+    """Clause on the times at which forces are judged and claimed: not at the start, nor beside a change.
+
+    A claim keeps twice the distance, so that the first judged sample behind a change is no later than the claim.
+    """
+    times = list(dict.fromkeys(f"{number(time, 3)} s" for time in made.changes))
+    told = f"{len(times)} times from {times[0]} to {times[-1]}" if len(times) > _NAMED else " and ".join(times)
+    beside = f", judged {made.every:g} s or more and claimed {2 * made.every:g} s or more from a jump (at {told})"
+    return f"forces from {made.every:g} s on{beside if times else ''}"
 
 
 def answer_lines(made: SceneAnswer) -> Iterator[str]:

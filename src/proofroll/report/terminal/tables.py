@@ -1,16 +1,20 @@
-"""Lines and tables of a report on the terminal."""
+"""Lines and tables of a report and of findings on the terminal."""
 
 from __future__ import annotations
 
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
+from rich.table import Column, Table
+from rich.text import Text
+
 from proofroll.core.number_format import counted
 from proofroll.core.verdict import Verdict
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.parts import part_kinds
-from proofroll.report.terminal.screen import WIDTH
+from proofroll.report.terminal.screen import WIDTH, plain_table, unbroken
 from proofroll.report.terminal.verdicts import verdict_of
+from proofroll.studies.findings import FindingState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -19,7 +23,14 @@ if TYPE_CHECKING:
     from proofroll.report.comparison.records import ReportedComparison
     from proofroll.report.page.records import ReportContent
     from proofroll.running.time_budget import ProcessorProfile
+    from proofroll.studies.findings import EngineFinding, Shown
 
+_STYLES = {
+    FindingState.SHOWS: "red",
+    FindingState.GONE: "green",
+    FindingState.NOT_INSTALLED: "dim",
+    FindingState.BROKEN: "yellow",
+}
 _FINE = (Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE)
 
 
@@ -95,3 +106,24 @@ def first_lines(content: ReportContent) -> list[str]:
 def _one_line(text: str) -> str:
     """Text without line breaks, which quoted messages may have."""
     return " ".join(text.split())
+
+
+def findings_table(rows: Sequence[Shown]) -> Table:
+    """Table with a line per finding: title, whether it shows in the installed version, output of its program."""
+    table = plain_table(*_folded("finding"), *unbroken("state"), *_folded("installed", "said"))
+    for row in rows:
+        version = f"{row.finding.package} {row.version}".strip() if row.version else ""
+        table.add_row(Text(row.finding.title), Text(row.state, style=_STYLES[row.state]), Text(version), Text(row.said))
+    return table
+
+
+def findings_list(findings: Sequence[EngineFinding]) -> Table:
+    """Table with a line per finding: title, versions where it was seen, version without it, and public thread."""
+    table = plain_table(*_folded("finding", "seen in", "gone in", "issue"))
+    for item in findings:
+        table.add_row(*(Text(text) for text in (item.title, item.seen, item.gone, item.issue)))
+    return table
+
+
+def _folded(*names: str) -> list[Column]:
+    return [Column(name, overflow="fold") for name in names]

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from proofroll.core.observable import Role
 from proofroll.core.plugins import EngineSpec, parse_engine
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status
@@ -22,7 +23,15 @@ from proofroll.running.time_budget import TIMING
 from proofroll.running.timing import time_in_rounds
 from proofroll.studies.answer.judged_run import JudgedRun
 from proofroll.studies.answer.question import AnswerQuestion
-from proofroll.studies.answer.records import AllowedError, EngineAnswer, SceneAnswer, SettingTried, StepTried, ranked
+from proofroll.studies.answer.records import (
+    AllowedError,
+    AnsweredScene,
+    EngineAnswer,
+    SceneAnswer,
+    SettingTried,
+    StepTried,
+    ranked,
+)
 from proofroll.studies.answer.search import (
     EngineSearch,
     SearchesAbreast,
@@ -100,25 +109,15 @@ def _answered(
     """Answer for one tolerance; ``spent``: processor time before it that counts as its own [s]."""
     begin = processor_seconds() - spent
     reference = abreast.references[question.every]
-    bounds = bounds_of(tolerance, reference)
-    unanswerable = unanswerable_because(bounds, reference)
-    allowed = {bound.quantity: bound.allowed for bound in bounds}
-    sizes = {bound.quantity: bound.size or bound.allowed for bound in bounds}
-    searches = [] if unanswerable else settings_of(question, curves, allowed, sizes, caps)
+    answered = answered_scene(question, tolerance, reference)
+    bounds = answered.bounds
+    searches = [] if answered.open else settings_of(question, curves, answered.allowed, answered.sizes, caps)
     lacking = [EngineSearch(engine=name, settings=[], cannot=why) for name, why in absent.items()]
     generators = [searching(search, question) for search in searches]
     abreast.run(generators, lambda number: tell(engine_answer(searches[number], bounds), question.until))
     speeds = _speeds(searches, question, abreast)
     return SceneAnswer(
-        scene=question.scene,
-        parameters=question.parameters,
-        until=min(question.until, float(reference.dataset.variables["time"].values[-1])),
-        every=question.every,
-        tolerance=tolerance.text,
-        bounds=bounds,
-        unjudged=orientations_of(question.loaded, allowed),
-        beyond=question.beyond,
-        open=unanswerable,
+        **vars(answered),
         engines=ranked([engine_answer(search, bounds, speeds) for search in [*searches, *lacking]]),
         spent=processor_seconds() - begin,
         measured=conditions_now(),
@@ -126,19 +125,33 @@ def _answered(
     )
 
 
-def bounds_of(tolerance: AskedTolerance, reference: Reference) -> list[AllowedError]:
-    """Bounds of the judged quantities that the truth knows."""
-    return [
+def answered_scene(question: AnswerQuestion, asked: AskedTolerance, reference: Reference) -> AnsweredScene:
+    """Scene and tolerance of an answer, with the bounds of the judged quantities that the truth knows."""
+    observables = reference.scene.observables
+    bounds = [
         AllowedError(
             quantity=name,
-            unit=reference.scene.observables[name].unit,
+            unit=observables[name].unit,
             allowed=allowed,
             size=reference.scale(name),
             truth_bar=reference.true(name, reference.curves[name]).error_bar,
-            relative=tolerance.bounds[name].relative,
+            relative=asked.bounds[name].relative,
         )
-        for name, allowed in tolerance.allowed(reference).items()
+        for name, allowed in asked.allowed(reference).items()
     ]
+    forces = any(observables[bound.quantity].role is Role.REACTION for bound in bounds)
+    return AnsweredScene(
+        scene=question.scene,
+        parameters=question.parameters,
+        until=min(question.until, float(reference.dataset.variables["time"].values[-1])),
+        every=question.every,
+        tolerance=asked.text,
+        bounds=bounds,
+        unjudged=orientations_of(question.loaded, [bound.quantity for bound in bounds]),
+        changes=reference.changes.tolist() if forces else [],
+        beyond=question.beyond,
+        open=unanswerable_because(bounds, reference),
+    )
 
 
 def unanswerable_because(bounds: Sequence[AllowedError], reference: Reference) -> str:

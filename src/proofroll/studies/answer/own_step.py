@@ -13,12 +13,12 @@ from proofroll.running.case import EngineFacts, Status
 from proofroll.running.engine_questions import on_scene, resolve_with_truth
 from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
-from proofroll.studies.answer.answers import bounds_of, engine_answer, spec_of, speeds_alone, unanswerable_because
+from proofroll.studies.answer.answers import answered_scene, engine_answer, spec_of, speeds_alone
 from proofroll.studies.answer.question import AnswerQuestion
 from proofroll.studies.answer.records import StepAnswer
 from proofroll.studies.answer.search import EngineSearch, SearchesAbreast, searching
 from proofroll.studies.answer.setting_search import SettingSearch, State
-from proofroll.studies.judging.asked_tolerance import AskedTolerance, orientations_of
+from proofroll.studies.judging.asked_tolerance import AskedTolerance
 from proofroll.studies.study_store import conditions_now
 
 # Halvings from the coarsest step that is run to the person's own: samples are at whole steps of its double and of four
@@ -64,7 +64,7 @@ def step_answer(
     question, references = question.well_posed(truth, runner)
     abreast = SearchesAbreast(references, runner)
     reference = abreast.references[question.every]
-    bounds = bounds_of(asked, reference)
+    answered = answered_scene(question, asked, reference)
     spec = parse_engine(engine)
     options = {key: value for key, value in spec.options.items() if key != resolution}
     size = float(own.settings[resolution])
@@ -74,17 +74,16 @@ def step_answer(
         facts=own,
         first=size * (2.0 if own.step is not None else 10.0) ** coarser,
         until=question.until,
-        allowed={bound.quantity: bound.allowed for bound in bounds},
-        sizes={bound.quantity: bound.size or bound.allowed for bound in bounds},
+        allowed=answered.allowed,
+        sizes=answered.sizes,
         start=coarser,
     )
     search = EngineSearch(own.name, [item])
-    unanswerable = unanswerable_because(bounds, reference)
     formulation = str(own.settings.get("formulation"))
     if not represents(question.loaded, formulation, own.provides):
         lacking = ", ".join(sorted(question.loaded.requires - set(own.provides.get(formulation, ()))))
         search = EngineSearch(own.name, [], f"{formulation.replace('_', ' ')} lacks {lacking}")
-    elif not unanswerable:
+    elif not answered.open:
         abreast.run([searching(search, question)])
     run = item.runs.get(item.divisor(coarser))
     worst = run.worst(item.allowed) if run else ""
@@ -92,28 +91,20 @@ def step_answer(
     within = run is not None and item.size(item.divisor(coarser)) <= 1
     compared = [(item, made) for made in (run, item.chosen) if item.chosen and made and made.status is Status.DONE]
     speeds = speeds_alone({spec_of(*pair): pair for pair in compared}, question, abreast)
-    advised = engine_answer(search, bounds, speeds)
+    advised = engine_answer(search, answered.bounds, speeds)
     luck, finer = item.unsafe.get(coarser, "").rpartition("holds by luck: ")[2], item.divisor(coarser + 1)
     if not luck and finer in item.runs and item.size(finer) > 1:
         part = "half" if item.fixed_step else "a tenth"
         luck = f"{part} of it is off by {number(item.size(finer))} times what is allowed"
     cost = speeds.get(spec_of(item, run), run.cost) if run else math.inf
     return StepAnswer(
-        scene=question.scene,
-        parameters=question.parameters,
-        until=min(question.until, float(reference.dataset.variables["time"].values[-1])),
-        every=question.every,
-        tolerance=asked.text,
-        bounds=bounds,
-        unjudged=orientations_of(question.loaded, item.allowed),
-        beyond=question.beyond,
-        open=unanswerable,
+        **vars(answered),
         spec=engine,
         resolution=resolution,
         step=size,
         holds=within and not luck and item.state is State.HOLDS and (item.level or 0) <= coarser,
         luck=luck if within else "",
-        bound=next((bound for bound in bounds if bound.quantity == worst), None),
+        bound=next((bound for bound in answered.bounds if bound.quantity == worst), None),
         error=error if math.isfinite(error) else None,
         status=str(run.status) if run else "",
         message=run.message if run else "",

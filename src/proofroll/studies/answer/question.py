@@ -179,7 +179,8 @@ class AnswerQuestion:
         sparse = sparse[sparse <= times[-1] * (1 + 1e-9)]
         indices = np.unique(np.abs(times[:, None] - sparse).argmin(axis=0))
         few = dataset.drop_dims(BETWEEN, errors="ignore").isel(time=indices)
-        return {self.every: Reference.of(self.loaded, dataset), self.sparse: Reference.of(self.loaded, few)}
+        pairs = (self.every, dataset), (self.sparse, few)
+        return {every: Reference.of(self.loaded, data, self.every) for every, data in pairs}
 
 
 def question_named(name: str, parameters: Mapping[str, object], until: float | None = None) -> AnswerQuestion:

@@ -143,6 +143,7 @@ class AnsweredScene:
         tolerance: as it was given.
         bounds: of the judged quantities.
         unjudged: observables of orientation that the tolerance does not bound.
+        changes: times at which forces may jump, as at a stick or an impact, beside which they are not judged [s].
         beyond: clause on why no longer run can be judged; empty: as long was asked for.
         open: why no engine can be judged here; empty: all are.
     """
@@ -154,8 +155,19 @@ class AnsweredScene:
     tolerance: str
     bounds: list[AllowedError]
     unjudged: list[str]
+    changes: list[float]
     beyond: str
     open: str
+
+    @property
+    def allowed(self) -> dict[str, float]:
+        """Quantity -> its largest allowed error, in its unit."""
+        return {bound.quantity: bound.allowed for bound in self.bounds}
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Quantity -> its size, or what is allowed of one without a size, in its unit."""
+        return {bound.quantity: bound.size or bound.allowed for bound in self.bounds}
 
 
 @dataclass(frozen=True)

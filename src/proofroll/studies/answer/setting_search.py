@@ -378,7 +378,8 @@ class SettingSearch:
             return uneven, fault
         if self.fixed_step:
             sizes.append(self.size(self._uneven(good)))
-        if irregular and max(sizes) > 1 / _MARGIN:
+        stays = self.fixed_step and max(sizes) + _MARGIN * (max(sizes) - min(sizes)) <= 1  # as of a soft contact
+        if irregular and max(sizes) > 1 / _MARGIN and not stays:
             fault = f"from {self._at(good)} on errors do not fall in order, with less than a factor of {_MARGIN:g}"
         return None, fault
 

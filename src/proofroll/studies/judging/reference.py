@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from proofroll.core.arrays import FloatArray, Vectors, magnitudes
 from proofroll.core.columns import SAMPLED_BAR
 from proofroll.core.dataset import (
+    BORDERS,
     BY_STEPS,
     CONTINUOUS,
     LEFT_OUT,
@@ -78,6 +79,7 @@ def _taylor(t: FloatArray, values: FloatArray) -> FloatArray:
 # At which other forces that have no value beside impacts jump, too; those of contacts are judged there.
 _REVERSES = frozenset({EventKind.SLIP, EventKind.STICK, EventKind.REST, EventKind.TURN})
 _PARTED = 0.1  # part of their largest difference at which two runs have parted
+_ROUNDED = 1e-9  # part of a distance in time that is round-off
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,7 @@ class Reference:
         curves: observable -> its true values; of a force that is not determinate all the time, zero where it is not.
         sizes: observable -> its scale.
         determinate: observable -> where the truth has a value; only those that lack some.
+        distance: from events, at which forces jump, within which no force is judged [s].
     """
 
     scene: Scene
@@ -97,13 +100,14 @@ class Reference:
     curves: dict[str, FloatArray]
     sizes: dict[str, float]
     determinate: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
+    distance: float = 0.0
 
     @classmethod
-    def of(cls, scene: Scene, dataset: xr.Dataset) -> Self:
+    def of(cls, scene: Scene, dataset: xr.Dataset, distance: float = 0.0) -> Self:
         """Reference from a true trajectory."""
         dataset = before_end(scene, dataset)
         curves, determinate = _true_curves(scene, dataset)
-        return cls(scene, dataset, curves, scales(scene, dataset), determinate)
+        return cls(scene, dataset, curves, scales(scene, dataset), determinate, distance)
 
     def common_span(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
         """Truth and runs cut to the time in which they are comparable (:class:`WatchesRuns`)."""
@@ -188,8 +192,17 @@ class Reference:
         return TrueCurve(self._on_either_side(name, curve, values), bar, self.ill_posed_for(name))
 
     def _on_either_side(self, name: str, curve: FloatArray, values: FloatArray) -> FloatArray:
-        """True curve with a run's own values at samples on an impact, where what jumps has a value on each side."""
+        """True curve with a run's own values at samples on an impact, where what jumps has a value on each side.
+
+        Of forces it has them at all samples that are not judged.
+        """
         item = self.scene.observables[name]
+        if item.role == Role.REACTION and self.distance and curve.shape[1:] == values.shape[1:]:
+            count = min(len(curve), len(values))
+            times = self.dataset.variables["time"].values
+            beside = np.flatnonzero(self.beside_changes(times[len(times) - len(curve) :])[:count])
+            curve = curve.copy()
+            curve[beside] = values[beside]
         if item.role == Role.EVENT or item.unit in CONTINUOUS or len(curve) != len(values):
             return curve
         jumps = [event for event in self.events if event.kind in JUMPS]
@@ -294,10 +307,20 @@ class Reference:
         """Error bar of an event that is located by samples only [s]: half the longest sampling interval."""
         return float(np.max(np.diff(self.dataset.variables["time"].values), initial=0.0)) / 2
 
+    @cached_property
+    def changes(self) -> FloatArray:
+        """Times at which forces may jump [s]: of the true events, and of all other changes of what acts."""
+        borders = np.atleast_1d(self.dataset.attrs.get(BORDERS, np.zeros(0)))
+        return np.unique([*(event.time for event in self.events), *borders])
+
     @property
     def events(self) -> list[Event]:
         """True events of all elements."""
         return self.events_of(self.dataset)
+
+    def beside_changes(self, times: FloatArray) -> NDArray[np.bool_]:
+        """True at times [s] so near to one of the :attr:`changes` that no force is judged, shape (time,)."""
+        return np.asarray((np.abs(times[:, None] - self.changes) < (1 - _ROUNDED) * self.distance).any(axis=1))
 
     def events_of(self, dataset: xr.Dataset) -> list[Event]:
         """Events of all elements in a run."""

@@ -146,6 +146,8 @@ def off_grid(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[Floa
         beside = np.clip(np.searchsorted(grid, nearest), left_out - 1, left_out + 1)
         left_out = np.concatenate([left_out, beside])
     alone = ~np.isin(np.searchsorted(grid, times), left_out)
+    if item is not None and item.role is Role.REACTION:
+        alone &= ~reference.beside_changes(times)
     both = np.isin(times, true_times) & alone & (times < grid[-1])
     times, values, true = (
         times[both],

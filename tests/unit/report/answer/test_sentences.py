@@ -12,6 +12,7 @@ from proofroll.report.answer.sentences import (
     command_of,
     installed_words,
     measure,
+    scope_sentence,
     sentence,
     step_sentence,
     taken_sentence,
@@ -22,7 +23,7 @@ from proofroll.studies.study_store import Measured
 
 METRES = AllowedError("positions", "m", 1e-3, 2.0, 1e-12, relative=False)
 OWN = StepAnswer(
-    scene="pendulum", parameters={}, until=5.0, every=0.02, tolerance="1 mm", bounds=[METRES], unjudged=[],
+    scene="pendulum", parameters={}, until=5.0, every=0.02, tolerance="1 mm", bounds=[METRES], unjudged=[], changes=[],
     beyond="", open="",
     spec="alpha[dt=0.002]", resolution="dt", step=2e-3, holds=True, luck="", bound=METRES, error=1.2e-4, status="done",
     message="", reached=5.0, held_until=5.0, seconds_per_second=1 / 160, advised=replace(HELD, step=2e-3), spent=1.0,
@@ -81,7 +82,13 @@ def test_an_answer_begins_with_what_to_take() -> None:
     assert lines[3] == "Not good enough: twice the step is off by 4 times what is allowed."
     assert lines[4] == "Judged: z, every 0.02 s over 2 s. Not judged: attitude."
     pressed = replace(scene_answer(HELD), bounds=[replace(scene_answer(HELD).bounds[0], quantity="N", unit="N")])
-    assert list(answer_lines(pressed))[-1].startswith("Judged: N, every 0.02 s over 2 s, forces after the start.")
+    assert scope_sentence(pressed) == ("Judged: N, every 0.02 s over 2 s, forces from 0.02 s on. Not judged: attitude.")
+    assert scope_sentence(replace(pressed, changes=[0.1, 0.5, 0.50000001])) == (
+        "Judged: N, every 0.02 s over 2 s, forces from 0.02 s on, judged 0.02 s or more and claimed 0.04 s or more "
+        "from a jump (at 0.1 s and 0.5 s). Not judged: attitude."
+    )
+    many = replace(pressed, changes=[0.1, 0.2, 0.3, 0.4, 0.5])
+    assert "from a jump (at 5 times from 0.1 s to 0.5 s)" in scope_sentence(many)
     assert taken_sentence(scene_answer(FINER)) == "No engine is shown to hold 1e-4 of the path over 2 s."
     blurred = replace(scene_answer(), open="the truth itself is known to 1e-3 m of z only")
     assert taken_sentence(blurred) == "Nothing can be advised for 1e-4: the truth itself is known to 1e-3 m of z only."

@@ -199,6 +199,29 @@ def test_an_answer_is_true_of_the_engine_and_is_stored(tmp_path: Path) -> None:
 
 
 @pytest.mark.nightly
+def test_advised_forces_hold_where_they_are_claimed(tmp_path: Path) -> None:
+    """At a run of other samples they hold at twice the interval from the event; beside it they are far off."""
+    import proofroll
+
+    runner = Runner(Store(tmp_path / "cases"), jobs=1, workers=Workers())
+    question = AnswerQuestion.of("slide_to_roll", {})
+    asked = AskedTolerance.of(["1e-2"], question.loaded, forces=True)
+    (made,) = answer(question, [asked], ["pinocchio[formulation=impulses,preset=default]"], runner)
+    assert made.confirmed is not None
+    (event,) = made.changes
+    (bound,) = [bound for bound in made.bounds if bound.quantity == "F2"]
+    every = 0.5 * (made.confirmed.step or 0.0)
+    runs = [
+        proofroll.simulate(question.loaded, spec, until=made.until, every=every)
+        for spec in (f"pinocchio[formulation=impulses,preset=default,dt={every!r}]", "truth")
+    ]
+    times = runs[0]["time"].to_numpy()
+    off = np.abs(runs[0]["F2"].to_numpy() - runs[1]["F2"].to_numpy())
+    claimed = (times >= made.every) & (np.abs(times - event) >= 2 * made.every)
+    assert off[claimed].max() <= bound.allowed < off[times >= made.every].max()
+
+
+@pytest.mark.nightly
 def test_a_chaotic_motion_is_judged_before_its_horizon(tmp_path: Path) -> None:
     """Runs that are longer than a motion can be known are judged as far as it is, and the answer says how far."""
     runner = Runner(Store(tmp_path / "cases"), jobs=1, workers=Workers())

@@ -140,6 +140,15 @@ def test_a_step_whose_half_is_not_affordable_is_not_confirmed() -> None:
         assert searched(item, lambda step: 0.02 * step, left=0.0).state is state
 
 
+def test_errors_that_stay_within_the_tolerance_are_its_own() -> None:
+    """A soft contact leaves an error that no step takes away: where it varies less than its margin, no finer is run."""
+    item = searched(setting(), lambda step: 6.8e-5 + 1e-2 * step**2)
+    assert item.state is State.HOLDS
+    assert item.chosen is not None
+    assert item.chosen.step == 0.025
+    assert min(run.step for run in item.runs.values()) == 0.0125
+
+
 def test_luck_is_unmasked_where_half_the_step_is_not_affordable() -> None:
     """Where half of a step costs too much, a step between them is run; if it fails, the first held by luck."""
     law = {0.1: 5e-3, 0.05: 5e-3, 0.025: 5e-5, 0.02: 2e-4}

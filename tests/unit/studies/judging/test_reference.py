@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -128,6 +129,29 @@ def test_a_velocity_at_an_impact_may_be_that_of_either_side() -> None:
         run = true.assign(v_WB=velocity)
         errors, *_ = errors_of(run, Reference.of(scene, true), whole=True)
         assert errors["v_WB"] < 1e-9
+
+
+def test_forces_of_an_answer_are_not_judged_beside_an_event() -> None:
+    """Nearer than the distance of the truth they count as right, also of a run that ended early, and nowhere else."""
+    force = ("time", np.array([0.0, 1, 1, 1, 3, 3, 3, 3]), {"units": "N", "error_bar": 0.0})
+    dataset = with_events(xr.Dataset({"forces": force}, {"time": 0.1 * np.arange(8)}), [Event("slip", 0.3, 0.3, 0.3)])
+    curve = dataset["forces"].to_numpy()[1:]
+    held = Reference(load_scene("falling_rod"), dataset, {"forces": curve}, {})
+    run = curve + 1.0
+    assert np.abs(run - held.true("forces", run).values).tolist() == [1, 1, 1, 1, 1, 1, 1]
+    answered = replace(held, distance=0.1)
+    assert np.abs(run - answered.true("forces", run).values).tolist() == [1, 1, 0, 1, 1, 1, 1]
+    wide = replace(held, distance=0.15)
+    assert np.abs(run - wide.true("forces", run).values).tolist() == [1, 0, 0, 0, 1, 1, 1]
+    assert wide.true("forces", run[:3]).values.tolist() == [1, 2, 2, 3, 3, 3, 3]
+    assert wide.beside_changes(np.array([0.14, 0.16, 0.44, 0.46])).tolist() == [False, True, True, False]
+    passing = replace(wide, dataset=dataset.assign_attrs(borders=np.array([0.3, 0.6])))
+    assert passing.changes.tolist() == [0.3, 0.6]
+    assert np.abs(run - passing.true("forces", run).values).tolist() == [1, 0, 0, 0, 0, 0, 0]
+    between = {"between.forces": ("between", np.array([1.0, 1, 3])), "between": np.array([0.15, 0.36, 0.55])}
+    answered, held = (replace(item, dataset=dataset.assign(between)) for item in (answered, held))
+    times = [run_values.off_grid(item, "forces", item.dataset) for item in (held, answered)]
+    assert [item[0].tolist() for item in times if item is not None] == [[0.15, 0.36, 0.55], [0.15, 0.55]]
 
 
 def test_reactions_at_the_last_sample_of_an_early_end_are_the_truths() -> None:

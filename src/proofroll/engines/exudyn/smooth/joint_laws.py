@@ -105,9 +105,7 @@ class JointLaws:
         sense = (-1.0 if rate < 0 else 1.0) if joint.friction else 0.0
         return self._system.AddObject(
             items.ObjectConnectorCoordinateSpringDamperExt(
-                markerNumbers=self._ends(joint.name),
-                nodeNumber=data_node(self._system, sense, 0.0, 0.0),
-                **law,
+                markerNumbers=self._ends(joint.name), nodeNumber=data_node(self._system, sense, 0.0, 0.0), **law
             )
         )
 

@@ -42,7 +42,7 @@ _OF_JOINTS = {
 }
 PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS | {MechanismCapability.REDUNDANT})
 LACKING: Mapping[str, str] = {
-    MechanismCapability.REBOUNDS: "its stops are springs with dampers, which have no coefficient of restitution",
+    MechanismCapability.REBOUNDS: "its stops are springs with dampers, which have no coefficient of restitution"
 }
 
 

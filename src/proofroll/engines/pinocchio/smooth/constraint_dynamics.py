@@ -23,10 +23,7 @@ _POINTS = {MechanismCapability.SPHERICAL_LOOP, MechanismCapability.REVOLUTE_LOOP
 _NO_ROWS = "Pinocchio's rigid constraints hold points or whole frames together, and no single angle or direction"
 _COUPLINGS = {MechanismCapability[name] for name in ("COUPLINGS", "COUPLINGS_OF_MANY", "MASSLESS", "MOTIONS")}
 PROVIDES = (joint_tree.PROVIDES - ALL_LOOPS | _POINTS) - _COUPLINGS
-LACKING: Mapping[str, str] = {
-    **joint_tree.LACKING,
-    **dict.fromkeys((ALL_LOOPS - _POINTS) | _COUPLINGS, _NO_ROWS),
-}
+LACKING: Mapping[str, str] = {**joint_tree.LACKING, **dict.fromkeys((ALL_LOOPS - _POINTS) | _COUPLINGS, _NO_ROWS)}
 # Of the proximal method.
 ITERATIONS, ACCURACY = 50, 1e-14
 _STEPS = {

@@ -181,11 +181,7 @@ class MechanismRun(MechanismMotion):
         weights = np.array(pin.computeGeneralizedGravity(model, data, q))
         both = np.array(pin.nonLinearEffects(model, data, q, v))
         upper = np.triu(M)
-        return {
-            "mass_matrix": upper + np.triu(M, 1).T,
-            "velocity_forces": both - weights,
-            "gravity_forces": weights,
-        }
+        return {"mass_matrix": upper + np.triu(M, 1).T, "velocity_forces": both - weights, "gravity_forces": weights}
 
     def _mass_matrix_error(self, q: Array) -> float:
         """Relative difference of the mass matrix of crba, used in the equations, from unit accelerations of rnea."""

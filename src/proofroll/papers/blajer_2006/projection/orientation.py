@@ -273,12 +273,7 @@ class FollowedFrame(RotatingFrame):
         """See :class:`Orientation`. q̇ = ½ ω ∘ q with ω in the world."""
         x, y, z = (0.5 * w for w in in_world(frame, *r))
         q0, q1, q2, q3 = angles
-        return (
-            -x * q1 - y * q2 - z * q3,
-            x * q0 - z * q2 + y * q3,
-            y * q0 + z * q1 - x * q3,
-            z * q0 - y * q1 + x * q2,
-        )
+        return (-x * q1 - y * q2 - z * q3, x * q0 - z * q2 + y * q3, y * q0 + z * q1 - x * q3, z * q0 - y * q1 + x * q2)
 
     @override
     def quaternion(self, angles: FloatArray) -> FloatArray:

@@ -98,10 +98,7 @@ class Polar(Sliding):
         return ExplicitRun(rates, time, np.append(state, 0.0), until, atol=self._atol_slaved, ended=ended)
 
     def _slide(self, start_state: FloatArray, floor: float, until: float) -> ExplicitRun:
-        stops: tuple[_Stop, ...] = (
-            (End.TIME, lambda y: y[7] - until),
-            (End.STILL, lambda y: floor - y[5]),
-        )
+        stops: tuple[_Stop, ...] = ((End.TIME, lambda y: y[7] - until), (End.STILL, lambda y: floor - y[5]))
 
         def ended(solver: Any) -> tuple[float, FloatArray, End] | None:
             # The clock and ln|u| pass their limits only once, so values at the end of a step suffice.

@@ -99,10 +99,7 @@ def _compiled(resistance: bool) -> TaylorModel:
         creep=integrator(
             creeping, [hy.t_event(size - limit, direction=up), hy.t_event(size + 1e-10 * limit, direction=down)]
         ),
-        slip=integrator(
-            slipping,
-            [hy.t_event(y - limit, direction=down), hy.t_event(t - t_end, direction=up)],
-        ),
+        slip=integrator(slipping, [hy.t_event(y - limit, direction=down), hy.t_event(t - t_end, direction=up)]),
         drive=Function([b2, b3, hy.sqrt(b_rate[0] ** 2 + b_rate[1] ** 2), N], [q, h, v2, v3, w1]),
         direction=Function([hy.atan2(s_slip, c_slip)], [q, h, v2, v3, w1, size]),
         rates=Function([rate for _, rate in rolling], [q, h, v2, v3, w1]),

@@ -9,25 +9,25 @@ from types import SimpleNamespace
 import pytest
 
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.running import example_packages
-from proofroll.running.example_packages import install
+from proofroll.running import make_environment
+from proofroll.running.make_environment import install
 
 ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_each_package_is_found_by_its_engine() -> None:
     """Each folder of examples/engines announces an engine, by which it is found; elsewhere there is none."""
-    found = example_packages.example_packages(ROOT)
+    found = make_environment.example_packages(ROOT)
     assert set(found.values()) == set((ROOT / "examples" / "engines").iterdir())
     assert found["mujoco_warp"].name == "proofroll-mujoco-warp"
-    assert example_packages.example_packages(ROOT / "tests") == {}
+    assert make_environment.example_packages(ROOT / "tests") == {}
 
 
 def test_a_package_is_installed_by_its_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pip gets the folder for this Python, and the engine is started once to tell its version."""
     calls: list[list[str]] = []
-    monkeypatch.setattr(example_packages, "output_of", calls.append)
-    monkeypatch.setattr(example_packages, "describe", lambda name: SimpleNamespace(version=f"9 of {name}"))
+    monkeypatch.setattr(make_environment, "output_of", calls.append)
+    monkeypatch.setattr(make_environment, "describe", lambda name: SimpleNamespace(version=f"9 of {name}"))
     assert install("rapier", {"rapier": ROOT}) == (f"9 of rapier@{sys.executable}", ROOT)
     assert calls == [[sys.executable, "-m", "pip", "install", "--quiet", str(ROOT)]]
 
