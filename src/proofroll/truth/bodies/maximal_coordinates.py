@@ -6,7 +6,7 @@ DOP853 with projection: the rank is fixed at the start, and violations are elimi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
@@ -21,16 +21,16 @@ from proofroll.core.arrays import uneven
 from proofroll.core.errors import Missing
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
-from proofroll.elements.mechanism.dynamics.named_forces import joint_force_shares, lengths, pick_named
-from proofroll.elements.mechanism.dynamics.record import Record, record_of
+from proofroll.elements.mechanism.dynamics.named_forces import joint_force_shares, lengths, named_forces, pick_named
+from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.scene.kinks import Functions
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.walls.formula import RecordedProgram, cos, sin
 from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.bodies.constraint_rows import ConstraintRow
-from proofroll.truth.bodies.maximal_bodies import BodyInScalars
 from proofroll.truth.bodies.maximal_equations import FUNCTIONS, ConstrainedEquations, MaximalEquations, Switched
 from proofroll.truth.bodies.maximal_taylor import MaximalTaylor, Visited, compiled_powers
+from proofroll.truth.numerics.scalars import Scalar
 
 # Initial displacement for growth, m, rad and relative to velocities: far above round-off, small if grown by 1e7.
 BESIDE = 1e-9
@@ -42,7 +42,7 @@ WEAKEST = 0.02
 
 @dataclass(frozen=True)
 class Solved:
-    """Accelerations u̇ and multipliers at one state, with matrices that eliminate violations.
+    """Accelerations u̇ and multipliers at a state, or at several along a first axis, with the way to remove violations.
 
     Attributes:
         equations: rows and loads at this state.
@@ -72,22 +72,21 @@ class NumericEquations:
         mass = equations.mass_matrix.copy()
         mass[equations.light, equations.light] += max(equations.usual)  # only the scale of the rows depends on it
         self._inverse_root = np.linalg.inv(np.linalg.cholesky(mass)).T
-        self.rank = self._rank(self.equations.start())
+        self.rank = int(self.ranks(self.equations.start()))
 
-    def switched(self, state: Array, switched: Switched) -> NumericEquations:
-        """Copy of the equations with joints held or pushed; rows of held ones give the rank at ``state``."""
+    def switched(self, switched: Switched, rank: int) -> NumericEquations:
+        """Copy of the equations with joints held or pushed; ``rank``: of all rows, with those of held joints."""
         equations = copy(self)
-        equations._switched = switched
-        if switched.held:
-            equations.rank = equations._rank(state)
+        equations._switched, equations.rank = switched, rank
         return equations
 
-    def _rank(self, state: Array) -> int:
-        C = self._matrix(self.equations.at(state.tolist(), switched=self._switched).rows)
-        values = np.linalg.svd(C @ self._inverse_root, compute_uv=False) if C.size else np.zeros(0)
+    def ranks(self, state: Array, switched: Switched | None = None) -> Array:
+        """Rank of the rows at a state, or at each of several, with those of held joints."""
+        C = self._matrix(self.equations.at(_scalars(state), switched=switched).rows, state.shape[:-1])
+        values = np.linalg.svd(C @ self._inverse_root, compute_uv=False) if C.size else np.zeros((*state.shape[:-1], 0))
         # rows that hold a planar body in its plane are none at all, but for round-off of a turned frame
         unit = float(np.linalg.svd(self._inverse_root, compute_uv=False)[-1])
-        return int((values > RANK * values.max(initial=unit)).sum())
+        return np.asarray((values > RANK * values.max(-1, keepdims=True, initial=unit)).sum(axis=-1))
 
     def independent_rows(self, state: Array | None = None) -> tuple[int, ...]:
         """Indices of linearly independent rows, as many as the rank, chosen by pivoting at a state, or at the start."""
@@ -122,38 +121,44 @@ class NumericEquations:
         equations, functions = self.equations, {**FUNCTIONS, "sin": sin, "cos": cos}
         program = RecordedProgram(len(equations.start()))
         rows = equations.lasting_rows(equations.views(program.symbols, functions), functions)
-        return program.arrays([self._matrix(rows, object)])
+        return program.arrays([self._matrix(rows, kind=object)])
 
     def _weighted(self, state: Array) -> Array:
         """Rows at a state, with velocities weighted by inertia."""
         return self._matrix(self.equations.lasting_rows(self.equations.views(state.tolist()))) @ self._inverse_root
 
-    def solve(self, state: Array, time: float = 0.0, applied: Array | None = None) -> Solved:
-        """Accelerations and multipliers at a time [s]; of dependent rows, the multipliers of least norm.
+    def solve(self, state: Array, time: float | Array = 0.0, applied: Array | None = None) -> Solved:
+        """Accelerations and multipliers at a state and a time [s], or at several; those of dependent rows are least.
 
-        ``applied``: further forces and moments about the centres of mass, world axes, (bodies, 6).
+        ``applied``: further forces and moments about the centres of mass, world axes, (…, bodies, 6).
         """
-        constrained = self.equations.at(state.tolist(), self.functions, switched=self._switched, time=time)
-        C, (half, force) = self._matrix(constrained.rows), self._driven(constrained)
+        constrained = self.equations.at(_scalars(state), self.functions, switched=self._switched, time=time)
+        shape = state.shape[:-1]
+        C, (half, force) = self._matrix(constrained.rows, shape), self._driven(constrained, shape)
         if applied is not None:
-            force = force + self.equations.projected(constrained.views, applied)
-        free = half.T @ force
-        residual = np.array([row.residual for row in constrained.rows], dtype=float)
+            wrenches = [_scalars(applied[..., body, :]) for body in range(applied.shape[-2])]
+            force = force + _stacked(self.equations.projected(constrained.views, wrenches), shape)
+        free = _product(half.swapaxes(-1, -2), force)
+        residual = _stacked([row.residual for row in constrained.rows], shape)
         if self._switched is not None and self._switched.held:
-            residual[-len(self._switched.held) :] = 0.0  # held where they are, not at zero
+            residual[..., -len(self._switched.held) :] = 0.0  # held where they are, not at zero
         if not self.rank:
-            into, back = np.zeros((len(half), 0)), np.zeros((0, len(C)))
-            return Solved(constrained, half @ free, np.zeros(len(C)), C, residual=residual, into=into, back=back)
+            into, back = np.zeros((*half.shape[:-1], 0)), np.zeros((0, C.shape[-2]))
+            multipliers = np.zeros(C.shape[:-1])
+            return Solved(constrained, _product(half, free), multipliers, C, residual=residual, into=into, back=back)
         weighted = C @ half
-        sizes = np.linalg.norm(weighted, axis=1)
+        sizes = np.linalg.norm(weighted, axis=-1)
         # rows of light rotors and of heavy frames alike; rows that are round-off stay so
-        even = 1 / np.where(sizes > RANK * sizes.max(), sizes, 1.0)
-        U, S, Vt = np.linalg.svd(even[:, None] * weighted, full_matrices=False)
-        locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None] * even
-        normal = -back @ np.array([row.bias for row in constrained.rows], dtype=float) - locked @ free
-        into = half @ locked.T
-        acceleration = half @ free + into @ normal
-        return Solved(constrained, acceleration, back.T @ normal, C, residual=residual, into=into, back=back)
+        even = 1 / np.where(sizes > RANK * sizes.max(axis=-1, keepdims=True), sizes, 1.0)
+        U, S, Vt = np.linalg.svd(even[..., None] * weighted, full_matrices=False)
+        locked = Vt[..., : self.rank, :]
+        back = U[..., : self.rank].swapaxes(-1, -2) / S[..., : self.rank, None] * even[..., None, :]
+        bias = _stacked([row.bias for row in constrained.rows], shape)
+        normal = _product(-back, bias) - _product(locked, free)
+        into = half @ locked.swapaxes(-1, -2)
+        acceleration = _product(half, free) + _product(into, normal)
+        multipliers = _product(back.swapaxes(-1, -2), normal)
+        return Solved(constrained, acceleration, multipliers, C, residual=residual, into=into, back=back)
 
     def loaded(
         self, state: Array, time: float = 0.0, switched: Switched | None = None
@@ -163,47 +168,49 @@ class NumericEquations:
         bias = np.array([row.bias for row in constrained.rows], dtype=float)
         return constrained, self._matrix(constrained.rows), bias, *self._driven(constrained)
 
-    def _driven(self, constrained: ConstrainedEquations) -> tuple[Array, Array]:
+    def _driven(self, constrained: ConstrainedEquations, shape: tuple[int, ...] = ()) -> tuple[Array, Array]:
         """H with M⁻¹ = H Hᵀ, and loads; both include the armature of joints."""
-        half, force = self._inverse_root, np.array(constrained.force, dtype=float)
+        half, force = self._inverse_root, _stacked(constrained.force, shape)
         if added := [*constrained.drives, *constrained.holders]:
-            G = self._matrix([drive.row for drive in added])
-            inertia = np.array([drive.inertia for drive in added])
-            half = np.linalg.inv(np.linalg.cholesky(self.equations.mass_matrix + (G.T * inertia) @ G)).T
-            force = force - G.T @ (inertia * np.array([drive.row.bias for drive in added], dtype=float))
+            G = self._matrix([drive.row for drive in added], shape)
+            inertia, back = np.array([drive.inertia for drive in added]), G.swapaxes(-1, -2)
+            half = np.linalg.inv(np.linalg.cholesky(self.equations.mass_matrix + (back * inertia) @ G)).swapaxes(-1, -2)
+            force = force - _product(back, inertia * _stacked([drive.row.bias for drive in added], shape))
         return half, force
 
     def along(self, state: Array, joints: Sequence[int]) -> tuple[Array, Array]:
-        """Coordinates and rates of joints with one coordinate, rad or m and per s.
+        """Coordinates and rates of joints with one coordinate at a state, or at several, rad or m and per s.
 
         Angles that are integrated count whole turns.
         """
-        e = self.equations
-        rows = e.rate_rows(state.tolist(), joints)
-        rates = self._matrix(rows) @ state[e.nx : e.nx + e.nu]
-        kept = {number: state[e.nx + e.nu + index] for index, (number, _) in enumerate(e.angles)}
-        positions = [kept.get(number, float(row.residual)) for number, row in zip(joints, rows, strict=True)]
-        return np.array(positions, dtype=float), np.asarray(rates, dtype=float)
+        e, shape = self.equations, state.shape[:-1]
+        rows = e.rate_rows(_scalars(state), joints)
+        rates = _product(self._matrix(rows, shape), state[..., e.nx : e.nx + e.nu])
+        kept = {number: state[..., e.nx + e.nu + index] for index, (number, _) in enumerate(e.angles)}
+        places = [kept.get(number, row.residual) for number, row in zip(joints, rows, strict=True)]
+        return _stacked(places, shape), rates
 
     def poses(self, state: Array) -> tuple[Array, Array, Array, Array]:
         """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
-        views = self.equations.views(self.normalised(state).tolist())[:-1]
-        R, r, v, w = (np.array([getattr(view, name) for view in views], float) for name in "Rrvw")
+        R, r, v, w = self.placed(self.normalised(state))
         arm = np.einsum("nij,nj->ni", R, np.array([body.com for body in self.equations.mechanism.bodies]))
         return r - arm, v - np.cross(w, arm), Rotation.from_matrix(R).as_quat(scalar_first=True), w
 
     def poses_at(self, states: Array) -> tuple[Array, Array, Array, Array]:
         """Places, velocities, rotations and angular velocities at states, each (states, bodies, …), world axes."""
-        unit = self.normalised(states).T
-        views = self.equations.views(list(unit), SMOOTH)[:-1]
-
-        def stacked(values: Sequence[Any]) -> Array:
-            return np.stack([np.broadcast_to(value, len(states)) for value in values], -1)
-
-        R = np.stack([np.stack([stacked(row) for row in view.R], -2) for view in views], 1)
-        r, v, w = (np.stack([stacked(getattr(view, name)) for view in views], 1) for name in "rvw")
+        R, r, v, w = self.placed(self.normalised(states), SMOOTH)
         arm = np.einsum("tnij,nj->tni", R, np.array([body.com for body in self.equations.mechanism.bodies]))
         return r - arm, v - np.cross(w, arm), R, w
+
+    def placed(self, state: Array, functions: Functions = FUNCTIONS) -> tuple[Array, Array, Array, Array]:
+        """Rotations, centres of mass, their velocities and angular velocities of all bodies, each (…, bodies, …)."""
+        views, shape = self.equations.views(_scalars(state), functions)[:-1], state.shape[:-1]
+        if not shape:
+            R, r, v, w = (np.array([getattr(view, name) for view in views], dtype=float) for name in "Rrvw")
+            return R, r, v, w
+        R = np.stack([np.stack([_stacked(row, shape) for row in view.R], -2) for view in views], -3)
+        r, v, w = (np.stack([_stacked(getattr(view, name), shape) for view in views], -2) for name in "rvw")
+        return R, r, v, w
 
     def normalised(self, state: Array) -> Array:
         """State, or states, (…, n), with quaternions of unit length."""
@@ -247,12 +254,32 @@ class NumericEquations:
             state = self.eliminated(state)
         return state
 
-    def _matrix(self, rows: Sequence[ConstraintRow], kind: type = float) -> Array:
-        C = np.zeros((len(rows), self.equations.nu), dtype=kind)
+    def _matrix(self, rows: Sequence[ConstraintRow], shape: tuple[int, ...] = (), kind: type = float) -> Array:
+        C = np.zeros((*shape, len(rows), self.equations.nu), dtype=kind)
         for number, row in enumerate(rows):
             for index, value in row.coefficients.items():
-                C[number, index] = value
+                C[..., number, index] = value
         return C
+
+
+def _scalars(state: Array) -> list[Scalar]:
+    """Scalars of a state, or of several, (states, n): numbers, or arrays over the states."""
+    return list(state.T) if state.ndim > 1 else state.tolist()
+
+
+def _stacked(values: Sequence[Any], shape: tuple[int, ...]) -> Array:
+    """Array (…, values) of scalars, each a number or an array of the shape."""
+    if not shape:
+        return np.array(values, dtype=float)
+    array = np.empty((*shape, len(values)))
+    for number, value in enumerate(values):
+        array[..., number] = value
+    return array
+
+
+def _product(matrix: Array, vector: Array) -> Array:
+    """Products of matrices (…, m, n) and vectors (…, n)."""
+    return np.asarray(matrix @ vector if vector.ndim == 1 else (matrix @ vector[..., None])[..., 0])
 
 
 class MaximalCoordinates:
@@ -321,46 +348,58 @@ class MaximalCoordinates:
 
         ``applied``: additional forces and moments about the centres of mass, world axes, (bodies, 6).
         """
-        modes = [None] * len(states) if switched is None else switched
-        more = [None] * len(states) if applied is None else applied
-        rows = zip(times, states, modes, more, strict=True)
-        record = record_of(times, [self._sample(float(t), self.lean.normalised(y), mode, w) for t, y, mode, w in rows])
+        lean = self.lean.equations
+        units, n = self.lean.normalised(states), len(self.mechanism.bodies)
+        R, r, v, w = self.lean.placed(units)
+        whole = self._complete(R, r, v, w, units[:, lean.nx + lean.nu :])
+        arms = np.stack([_product(R[:, k], np.array(body.com)) for k, body in enumerate(self.mechanism.bodies)], axis=1)
+        loads = None if applied is None else np.array(applied)
+        wrench = np.zeros((len(times), len(self._whole.equations.connections), 6))
+        named, residual = np.zeros((len(times), len(named_forces(self.mechanism)))), np.zeros((len(times), 2))
+        u = whole[:, self._whole.equations.nx :][:, : self._whole.equations.nu]
+        for chosen, mode, rank in self._alike(whole, [Switched()] * len(times) if switched is None else switched):
+            equations = self._whole.switched(mode, rank)
+            solved = equations.solve(whole[chosen], times[chosen], None if loads is None else loads[chosen])
+            opening = solved.equations.opening(_product(solved.C, u[chosen]))
+            wrench[chosen], named[chosen] = self._wrenches(solved), self._named(solved, mode)
+            for k, violated in enumerate((solved.residual, opening)):
+                residual[chosen, k] = np.abs(violated).max(axis=-1, initial=0.0)
+        record = Record(
+            time=times,
+            p_WB=r - arms,
+            v_WB=v - np.cross(w, arms),
+            q_WB=whole[:, : 7 * n].reshape(-1, n, 7)[..., 3:],
+            w_WB=w,
+            q=np.zeros((len(times), 0)),  # set below, from the poses at all times
+            v=np.zeros((len(times), 0)),
+            wrench=wrench,
+            named=named,
+            residual=residual,
+        )
         q, v = record.placed(self.mechanism).of_tree()
         return replace(record, q=q, v=v)
 
-    def _sample(
-        self, time: float, state: Array, switched: Switched | None = None, applied: Array | None = None
-    ) -> dict[str, Any]:
-        lean = self.lean.equations
-        views = lean.views(state.tolist())
-        whole = self._complete(views, state[lean.nx + lean.nu :])
-        solved = self._solved(time, whole, switched, applied)
-        u = whole[self._whole.equations.nx :][: self._whole.equations.nu]
-        opening = solved.equations.opening(solved.C @ u)
-        n = len(self.mechanism.bodies)
-        arms = [np.array(view.R) @ body.com for view, body in zip(views, self.mechanism.bodies, strict=False)]
-        return {
-            "p_WB": np.array([np.array(views[i].r) - arms[i] for i in range(n)]),
-            "v_WB": np.array([np.array(views[i].v) - np.cross(views[i].w, arms[i]) for i in range(n)]),
-            "q_WB": whole[: 7 * n].reshape(n, 7)[:, 3:],
-            "w_WB": np.array([views[i].w for i in range(n)], dtype=float),
-            "q": [],  # set later, from the poses at all times
-            "v": [],
-            "wrench": self._wrenches(solved),
-            "named": self._named(solved, switched or Switched()),
-            "residual": np.array([np.abs(solved.residual).max(initial=0.0), np.abs(opening).max(initial=0.0)]),
-        }
-
-    def _solved(self, time: float, whole: Array, switched: Switched | None, applied: Array | None) -> Solved:
-        """Accelerations and multipliers of the rows in space at a state that is whole."""
-        equations = self._whole if switched is None else self._whole.switched(whole, switched)
-        return equations.solve(whole, time, applied)
+    def _alike(self, whole: Array, switched: Sequence[Switched]) -> Iterator[tuple[list[int], Switched, int]]:
+        """Groups of states with the same joints held and efforts clamped: numbers, values over them, rank of rows."""
+        ranks = np.full(len(whole), self._whole.rank)
+        for held in {mode.held for mode in switched if mode.held}:
+            chosen = [number for number, mode in enumerate(switched) if mode.held == held]
+            ranks[chosen] = self._whole.ranks(whole[chosen], Switched(held))
+        groups: dict[Hashable, list[int]] = {}
+        for number, mode in enumerate(switched):
+            kind = int(ranks[number]), mode.held, mode.stopped, tuple(mode.push), tuple(mode.clamped)
+            groups.setdefault(kind, []).append(number)
+        for chosen in groups.values():
+            first, modes = switched[chosen[0]], [switched[number] for number in chosen]
+            push = {key: np.array([mode.push[key] for mode in modes]) for key in first.push}
+            clamped = {key: np.array([mode.clamped[key] for mode in modes]) for key in first.clamped}
+            yield chosen, Switched(first.held, first.stopped, push, clamped), int(ranks[chosen[0]])
 
     def reactions(self, time: float, state: Array, switched: Switched, applied: Array) -> tuple[Array, Array]:
         """Reactions (joints + loops, 6) and named forces at a state of :meth:`recorded` with unit quaternions."""
-        lean = self.lean.equations
-        whole = self._complete(lean.views(state.tolist()), state[lean.nx + lean.nu :])
-        solved = self._solved(time, whole, switched, applied)
+        whole = self._complete(*self.lean.placed(state), state[self.lean.equations.nx + self.lean.equations.nu :])
+        rank = int(self._whole.ranks(whole, switched)) if switched.held else self._whole.rank
+        solved = self._whole.switched(switched, rank).solve(whole, time, applied)
         return self._wrenches(solved), self._named(solved, switched)
 
     def powers(self, times: Array, states: Array) -> Array:
@@ -378,47 +417,45 @@ class MaximalCoordinates:
             )
             unit = np.array([self.lean.normalised(y) for y in states])
             return compiled(np.column_stack([unit, times]))
-        numbers = [number for number, _ in working(self.mechanism)]
-        return np.array(
-            [
-                self._named(self.lean.solve(self.lean.normalised(y), float(t)), Switched())[numbers]
-                * self.lean.along(y, joints)[1]
-                for t, y in zip(times, states, strict=True)
-            ]
-        ).reshape(len(times), len(joints))
+        named = self._named(self.lean.solve(self.lean.normalised(states), times), Switched())
+        return named[:, [number for number, _ in working(self.mechanism)]] * self.lean.along(states, joints)[1]
 
-    def _complete(self, views: list[BodyInScalars], angles: Array) -> Array:
-        """State with seven coordinates for each body, also for planar ones."""
-        x: list[float] = []
-        u: list[float] = []
-        for view in views[:-1]:
-            R = Rotation.from_matrix(np.array(view.R, dtype=float))
-            x += [*view.r, *R.as_quat(canonical=True, scalar_first=True)]
-            u += [*view.v, *R.inv().apply(np.array(view.w, dtype=float))]
-        return np.array([*x, *u, *angles])
+    @staticmethod
+    def _complete(R: Array, r: Array, v: Array, w: Array, angles: Array) -> Array:
+        """State, or states, with seven coordinates for each body, also for planar ones."""
+        rotations, shape = Rotation.from_matrix(R.reshape(-1, 3, 3)), angles.shape[:-1]
+        quaternions = rotations.as_quat(canonical=True, scalar_first=True).reshape(*r.shape[:-1], 4)
+        spins = _product(rotations.inv().as_matrix().reshape(R.shape), w)
+        x, u = (np.concatenate(parts, axis=-1).reshape(*shape, -1) for parts in ((r, quaternions), (v, spins)))
+        return np.concatenate([x, u, angles], axis=-1)
 
     def _wrenches(self, solved: Solved) -> Array:
-        wrenches = np.zeros((len(self._whole.equations.connections), 6))
-        for row, multiplier in zip(solved.equations.rows, solved.multipliers, strict=True):
-            wrenches[row.connection] += multiplier * np.array([*row.force, *row.torque])
-            for connection, force, torque in row.besides:
-                wrenches[connection] += multiplier * np.array([*force, *torque])
+        shape = solved.multipliers.shape[:-1]
+        wrenches = np.zeros((*shape, len(self._whole.equations.connections), 6))
+
+        def add(connection: int, force: Sequence[Scalar], torque: Sequence[Scalar], factor: Array) -> None:
+            wrenches[..., connection, :] += factor[..., None] * _stacked([*force, *torque], shape)
+
+        for row, multiplier in zip(solved.equations.rows, solved.multipliers.T, strict=True):
+            for wrench in ((row.connection, row.force, row.torque), *row.besides):
+                add(*wrench, np.asarray(multiplier))
         for row, inertia in solved.equations.drives:
-            rate = sum(value * solved.acceleration[k] for k, value in row.coefficients.items()) + row.bias
-            wrenches[row.connection] -= inertia * rate * np.array([*row.force, *row.torque])
-        for number, (force, moment) in enumerate(solved.equations.laws):
-            wrenches[number] += np.array([*force, *moment])
+            rate = sum(value * solved.acceleration[..., k] for k, value in row.coefficients.items()) + row.bias
+            add(row.connection, row.force, row.torque, np.asarray(-inertia * rate))
+        for number, law in enumerate(solved.equations.laws):
+            add(number, *law, np.ones(()))
         return wrenches
 
     def _named(self, solved: Solved, switched: Switched) -> Array:
-        fields = {name: np.zeros(count) for name, count in lengths(self.mechanism).items()}
-        fields["effort"][:] = solved.equations.efforts
-        fields["coupling"][:] = solved.multipliers[solved.equations.coupled]
+        multipliers, shape = solved.multipliers, solved.multipliers.shape[:-1]
+        fields = {name: np.zeros((*shape, count)) for name, count in lengths(self.mechanism).items()}
+        fields["effort"][:] = _stacked(solved.equations.efforts, shape)
+        fields["coupling"][:] = multipliers[..., solved.equations.coupled]
         driven = [self.mechanism.joint_index[joint.name] for joint, _, _ in self.mechanism.prescribed]
-        fields["drive"][driven] = solved.multipliers[solved.equations.moved]
-        holding = dict(zip(switched.held, solved.multipliers[solved.equations.moved.stop :], strict=True))
+        fields["drive"][..., driven] = multipliers[..., solved.equations.moved]
+        holding = dict(zip(switched.held, multipliers.T[solved.equations.moved.stop :], strict=True))
         for number, joint in enumerate(self.mechanism.joints):
             force = holding.get(number, switched.push.get(number, 0.0))
             on = joint_force_shares(number in switched.stopped, joint.friction, force)
-            fields["friction"][number], fields["stop"][number] = on
-        return pick_named(self.mechanism, fields)
+            fields["friction"][..., number], fields["stop"][..., number] = on
+        return pick_named(self.mechanism, fields).T.reshape(*shape, -1)

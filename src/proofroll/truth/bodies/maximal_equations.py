@@ -41,7 +41,15 @@ from proofroll.truth.switching.bushing_scalars import bushing_load
 
 # Kinds whose coordinates are angles that may exceed a turn; the first route has a list of its own.
 _COUNTED = frozenset({JointKind.REVOLUTE, JointKind.UNIVERSAL})
-FUNCTIONS: Mapping[str, Callable[..., Any]] = {**{name: getattr(math, name) for name in SMOOTH}, **KINKED}
+
+
+def _of_each(name: str) -> Callable[[Any], Any]:
+    """Function of a number, or of each in an array, with the same digits."""
+    function = getattr(math, name)
+    return lambda x: np.array([*map(function, x.tolist())]) if isinstance(x, np.ndarray) else function(x)
+
+
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {**{name: _of_each(name) for name in SMOOTH}, **KINKED}
 
 
 class Drive(NamedTuple):
@@ -63,7 +71,7 @@ class Switched(NamedTuple):
 
     held: tuple[int, ...] = ()
     stopped: tuple[int, ...] = ()
-    push: Mapping[int, float] = {}
+    push: Mapping[int, Scalar] = {}
     clamped: Mapping[int, Scalar] = {}
 
 
@@ -235,12 +243,10 @@ class MaximalEquations:
             moved=moved_rows,
         )
 
-    def projected(self, views: Sequence[BodyInScalars], applied: Array) -> Array:
-        """Generalised forces along u of forces and moments about the centres of mass, world axes, (bodies, 6)."""
-        bodies = zip(self.bodies, views, applied.tolist(), strict=False)
-        return np.array(
-            [entry for body, view, wrench in bodies for entry in body.projected(view, wrench[:3], wrench[3:])], float
-        )
+    def projected(self, views: Sequence[BodyInScalars], applied: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+        """Generalised forces along u of forces and moments about the centres of mass, world axes, of each body."""
+        bodies = zip(self.bodies, views, applied, strict=False)
+        return [entry for body, view, wrench in bodies for entry in body.projected(view, wrench[:3], wrench[3:])]
 
     def rate_rows(
         self, state: Sequence[Scalar], joints: Sequence[int], functions: Mapping[str, Any] = FUNCTIONS
