@@ -171,7 +171,7 @@ def touch(contact: BodyContact, a: Moving, b: Moving, feature: int | None = None
 
 def _touch_boxes(slot: BoxSlot, a: Moving, b: Moving, feature: int | None) -> Touching:
     """One contact of two boxes; see :func:`touch`."""
-    lying = _lying_of(slot, a, b)
+    lying, absents = _lying_of(slot, a, b)
     faces = lying.faces if feature is None else slot.faces(feature)
     all_beyond, heights = lying.beyond(faces)
     beyond = float(all_beyond[slot.slot])
@@ -183,8 +183,9 @@ def _touch_boxes(slot: BoxSlot, a: Moving, b: Moving, feature: int | None) -> To
         shape_a, shape_b = slot.shapes(feature)
         return _touch(shape_a, a, shape_b, b)._replace(feature=feature, borders=tuple(borders))
     gap = beyond if slot.of_edges else max(beyond, float(heights[slot.slot]))
-    apart = _absent(gap, lying.normal(False, faces[1]), lying.place_a, a, b)
-    return apart._replace(feature=feature, borders=tuple(borders))
+    if faces[1] not in absents:
+        absents[faces[1]] = _absent(0.0, lying.normal(False, faces[1]), lying.place_a, a, b)
+    return absents[faces[1]]._replace(gap=gap, feature=feature, borders=tuple(borders))
 
 
 def _absent(gap: float, normal: Array, place: Array, a: Moving, b: Moving) -> Touching:
@@ -222,10 +223,11 @@ def _touch_capsule(slot: CapsuleBoxSlot, a: Moving, b: Moving, feature: int | No
     return touching._replace(feature=feature, borders=borders)
 
 
-_LYING: list[tuple[Moving, Moving, BoxShape, BoxShape, Lying]] = []  # of the last boxes, which have many contacts
+# Of the last boxes, which have many contacts, with those that are absent by the face of the second box.
+_LYING: list[tuple[Moving, Moving, BoxShape, BoxShape, tuple[Lying, dict[int, Touching]]]] = []
 
 
-def _lying_of(slot: BoxSlot, a: Moving, b: Moving) -> Lying:
+def _lying_of(slot: BoxSlot, a: Moving, b: Moving) -> tuple[Lying, dict[int, Touching]]:
     box_a, box_b = slot.first, slot.second
     for last in _LYING[:1]:
         if last[0] is a and last[1] is b and last[2] is box_a and last[3] is box_b:
@@ -238,8 +240,8 @@ def _lying_of(slot: BoxSlot, a: Moving, b: Moving) -> Lying:
         axes_b=b.R @ box_b.frame,
         half_b=box_b.half,
     )
-    _LYING[:] = [(a, b, box_a, box_b, lying)]
-    return lying
+    _LYING[:] = [(a, b, box_a, box_b, (lying, {}))]
+    return _LYING[0][4]
 
 
 def _measures(features: SolidFeatures, a: Moving, b: Moving) -> tuple[Any, ...]:
