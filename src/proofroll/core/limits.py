@@ -4,7 +4,7 @@
 TIME_LIMIT = 120.0
 # A single run from the command line, whose user may stop it by hand.
 RUN_TIME_LIMIT = 600.0
-# Part of a run's limit that the two routes of a truth may take, as processor time; what they found is then sampled.
+# Part of a run's limit that a truth may take with its samples, as processor time; the last checks have the rest.
 FOR_A_TRUTH = 0.8
 # One of the many runs of a study.
 STUDY_TIME_LIMIT = 60.0

@@ -4,15 +4,17 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from proofroll.core.errors import Diverged
 
 _EVERY = 1.0  # s of processor time between two messages
 _TELLING = 0.01  # part of a route from which its pace is told: the first steps are shorter than those to come
 AT = "truth at "  # beginning of a line that a worker prints about it
-# Route -> part of the limit that is used when it ends; of a smooth motion the second is followed twice, and sampled.
-_ROUTES = {"first": 0.5, "second": 1.0}
-_SMOOTH = 0.55
+# Route -> part of the limit that is used when it ends; then motions are held against laws, followed again, and sampled.
+_ROUTES = {"first": 0.275, "second": 0.55, "steps": 1.0}
+# Processor time of a sample [s] that all but the dearest need; number of samples by which a time is foretold.
+_SAMPLE, _FEW = 0.1, 16
 _CHECKED = "its end, held against the laws"
 
 
@@ -28,14 +30,15 @@ class Pace:
         text: time that is reached and, after the first steps, time that is still needed, or that routes have ended;
             empty: no truth is made.
         over: True if the last truth was ended by its limit.
+        reason: why a truth ends that is ended by its limit.
         aloud: True in a worker, whose lines the process that started it reads.
     """
 
     def __init__(self) -> None:
-        self.text, self.over, self.until, self.aloud = "", False, 0.0, False
+        self.text, self.reason, self.over, self.until, self.aloud = "", "", False, 0.0, False
         self._tell: Callable[[str], object] = str
         self._limit, self._began = math.inf, 0.0
-        self._route, self._begun, self._end, self._told, self._part = "", (0.0, 0.0), math.inf, 0.0, 1.0
+        self._route, self._begun, self._end, self._told = "", (0.0, 0.0), math.inf, 0.0
 
     @contextmanager
     def limited(self, seconds: float, tell: Callable[[str], object] = str) -> Iterator[None]:
@@ -46,6 +49,7 @@ class Pace:
             tell: called with the text about every second.
         """
         self._limit, self._tell, self.over = seconds, tell, False
+        self.reason = f"its limit of {seconds:g} s of processor time was reached"
         self._began = self._told = time.process_time()
         try:
             yield
@@ -54,16 +58,28 @@ class Pace:
             self._route = self.text = ""
             self._tell("")  # what was told before is over
 
-    def follow(self, route: str, end: float, *, smooth: bool = False) -> None:
-        """Begins the ``first`` or ``second`` route to an end in its own unit of time.
-
-        ``smooth``: nothing switches, so that what follows the routes takes as long as they do.
-        """
+    def follow(self, route: str, end: float) -> None:
+        """Begins the ``first`` or ``second`` route, or the only one by ``steps``, to an end in its own unit of time."""
         self._route, self._begun, self._end = route, (time.process_time(), -1.0), end
-        self._part = _ROUTES[route] * (_SMOOTH if smooth else 1.0)
+
+    def fitting(self, times: Any, sample: Callable[[Any], object]) -> int:
+        """Number of the first of some times, at least one, for whose samples the limit leaves processor time.
+
+        ``times``: an array. ``sample``: finds samples at some of them, to see what a few take where all may not fit.
+        """
+        left = self._began + self._limit - time.process_time()
+        if left > _SAMPLE * len(times):
+            return len(times)
+        few = times[:: -(-len(times) // _FEW)]
+        begun = time.process_time()
+        sample(few)
+        each = (time.process_time() - begun) / len(few)
+        count = len(times) if each * len(times) <= max(left, 0.0) else max(1, int(left / each) - len(few))
+        self.over = self.over or count < len(times)
+        return count
 
     def leave(self) -> None:
-        """Ends a route: what follows, which may take as long, has no limit and no forecast."""
+        """Ends a route: what follows has no forecast."""
         self._route, self.text = "", _CHECKED if self.text and self._limit < math.inf else ""
         if self.text:
             self._tell(self.text)
@@ -77,9 +93,9 @@ class Pace:
         if not self._route:
             return
         used, part = time.process_time(), t / self._end
-        if used - self._began > self._part * self._limit:
+        if used - self._began > _ROUTES[self._route] * self._limit:
             self.over = True
-            raise OutOfTime(f"its limit of {self._limit:g} s of processor time was reached", t)
+            raise OutOfTime(self.reason, t)
         if self._begun[1] < 0:  # what came before, like compiling, says nothing of the pace
             self._begun = used, part
         came = part - self._begun[1]

@@ -132,7 +132,7 @@ def truth(
         Diverged: two routes disagree.
     """
     times = np.union1d(asked, np.concatenate([counting, between])) if len(counting) or len(between) else asked
-    PACE.until = float(times[-1])
+    PACE.until, PACE.over = float(times[-1]), False
     parts = {element.name: _of_element(element, times, scene, engines) for element in scene.elements}
     columns = joined(scene, _to_common_end({name: Columns.of(part) for name, part in parts.items()}))
     whole = (columns if times is asked else off_grid_apart(scene, columns, asked, between)).dataset()

@@ -79,7 +79,7 @@ def reference_by_steps(element: MechanismElement, times: FloatArray, engines: Se
         raise Refused(f"{reason}, and no installed engine that represents it declares its steps as a reference")
     runs: list[_SteppedRun] = []
     steps = _steps(element)
-    PACE.follow("second", sum(times[-1] / step for step in steps))
+    PACE.follow("steps", sum(times[-1] / step for step in steps))
     for step in steps:
         try:
             runs.append(_run(element, times, step, engines[0], before=sum(times[-1] / run.step for run in runs)))

@@ -3,16 +3,18 @@
 Contacts of bodies, dry friction, stops and effort limits of joints are rows with bounds of the same machine.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from proofroll.core.bounces import Bounce, Course, exact_bounces, with_bars
 from proofroll.core.errors import Refused
 from proofroll.core.events import IMPACTS, JUMPS, Event, EventKind
+from proofroll.core.pace import PACE
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.modes import REST, Acting, ContactMode
@@ -56,6 +58,7 @@ from proofroll.truth.tree.contact_tree import ContactTree
 _CROWD, _CROWDED = 5, 1e-3
 
 _Path = HybridPath[Stretch[ContactMode]]
+_Routes = tuple[HybridRoute[ContactMode], HybridRoute[ContactMode]]
 
 
 def switched_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
@@ -94,36 +97,44 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     tree.faces = bodies.faces = faces
     until, breaking, kinds = float(times[-1]), breaks(scaled.signals), partial(_kinds, dynamics)
     paths, routes = _followed(tree, bodies, held_paths, until, breaking)
-    recorded = [
+    of_routes = [
         of_tree(mechanism, units, tree, paths[0], held_paths[0] if held_paths else None),
         of_bodies(mechanism, units, bodies, second, paths[1], held_paths[1] if held_paths else None),
     ]
-    outcome = held_to_laws(mechanism, units, recorded)
+    outcome = held_to_laws(mechanism, units, of_routes)
     if np.isfinite(outcome.end):
         paths = cut_at(paths[0], outcome.end, outcome.text), cut_at(paths[1], outcome.end, outcome.text)
     reason = _reason(dynamics, paths)
     asked = times_known(paths, times, reason)
     times = held_paths[1].on_instants(held_paths[0].on_instants(asked)) if held_paths else asked
-    stretches = stretches_at(paths, times)
-    others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
-    states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
-    for values in held_paths:
-        values.finish()
+
+    def sampled(times: Array) -> tuple[list[int], list[int], Routed, Routed]:
+        """Numbers of stretches, and motion without works, of both routes at known times in natural units."""
+        (stretches, others), states = _states(routes, paths, held_paths, times, kinds)
+        by_tree = _by_the_tree(tree, paths[0], times, states[0], stretches)
+        modes = (bodies.acting(paths[1].stretches[k], y) for k, y in zip(others, states[1], strict=True))
+        record, pressed = bodies.recorded(second, times, states[1], modes)
+        record = on_same_turns(scaled, by_tree.record, record)
+        return stretches, others, by_tree, Routed(record, by_tree.works, pressed if scaled.contacts else None)
+
+    count = PACE.fitting(times, sampled)
+    if count < len(times):
+        paths = cut_at(paths[0], float(times[count]), PACE.reason), cut_at(paths[1], float(times[count]), PACE.reason)
+    times, asked = times[:count], asked[:count]
+    stretches, others, by_tree, by_bodies = sampled(times)
     seconds, known_until = times * units.time, _works_known(tree, paths[0])
     at_samples = zip(outcome.works, (stretches, others), strict=True)
     (work_of_tree, *rest_of_tree), (work_of_bodies, *rest) = (work.at(seconds, numbers) for work, numbers in at_samples)
-    works = np.where(times[:, None] > known_until, np.nan, work_of_tree), work_of_bodies
+    works = np.where(times[:, None] > known_until, np.nan, work_of_tree)
     unresolved = np.max([*rest_of_tree, *rest], axis=0)[:, np.isinf(known_until)].max(axis=1, initial=0.0)
-    by_tree = _by_the_tree(tree, paths[0], times, states[0], stretches, works[0])
-    by_bodies = _by_the_bodies(bodies, second, paths[1], times, states[1], others, works[1])
-    by_bodies = by_bodies._replace(record=on_same_turns(scaled, by_tree.record, by_bodies.record))
-    cut = None if held_paths else cut_early(tree.early(), paths[0], until, breaking, times, kinds)
+    by_tree, by_bodies = by_tree._replace(works=works), by_bodies._replace(works=work_of_bodies)
+    cut = None if held_paths else cut_early(tree.early(), paths[0], float(times[-1]), breaking, times, kinds)
     left = None
     if cut is not None:
         earlier = at_times(cut[0], counterparts((paths[0], cut[0]), stretches, kinds), times, kinds)
+        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier)
         early_works = work_along(mechanism, units, tree, cut[0]).at(seconds, earlier)[0]
-        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier, early_works)
-        early = early._replace(record=on_same_turns(scaled, by_tree.record, early.record))
+        early = early._replace(record=on_same_turns(scaled, by_tree.record, early.record), works=early_works)
         left = _in_si(mechanism, units, early), cut[1]
     middles = _between(tree, routes[0], paths[0])
     motion = replace(
@@ -147,15 +158,27 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     if not scaled.contacts:
         return motion
     last = min(until, *(path.stretches[-1].end for path in paths))
-    return replace(
-        motion,
-        bounces=contact_bounces(scaled, list(zip((tree, bodies), paths, strict=True)), motion.events, units, last),
-    )
+    bounces = contact_bounces(scaled, [(tree, paths[0]), (bodies, paths[1])], motion.events, units, last)
+    return replace(motion, bounces=bounces)
+
+
+def _states(
+    routes: _Routes, paths: tuple[_Path, _Path], held_paths: Sequence[HeldPath], times: Array, kinds: Callable[..., Any]
+) -> tuple[tuple[list[int], list[int]], tuple[Array, Array]]:
+    """Numbers of stretches of both routes, and states, at known times in natural units."""
+    stretches = stretches_at(paths, times)
+    others = at_times(paths[1], counterparts(paths, stretches, kinds), times, kinds)
+    for values in held_paths:
+        values.resume()
+    states = states_of(routes[0], paths[0], times, stretches), states_of(routes[1], paths[1], times, others)
+    for values in held_paths:
+        values.finish()
+    return (stretches, others), states
 
 
 def _followed(
     tree: ContactTree, bodies: ContactBodies, held_paths: Sequence[HeldPath], until: float, breaking: Sequence[float]
-) -> tuple[tuple[_Path, _Path], tuple[HybridRoute[ContactMode], HybridRoute[ContactMode]]]:
+) -> tuple[tuple[_Path, _Path], _Routes]:
     """Paths of both routes to a time in natural units, and the routes, which hold values if the mechanism does.
 
     ``breaking``: times at which the rates are not smooth.
@@ -237,10 +260,8 @@ def _crowded(path: _Path, time: float) -> str:
     )
 
 
-def _by_the_tree(
-    tree: ContactTree, path: _Path, times: Array, states: Array, stretches: Sequence[int], works: Array
-) -> Routed:
-    """Motion and forces of the first route along a path with these states, in natural units; ``works``: in SI units."""
+def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array, stretches: Sequence[int]) -> Routed:
+    """Motion and forces, without works, of the first route along a path with these states, in natural units."""
     dynamics = tree.dynamics
     records, forces, sums = zip(
         *(
@@ -251,26 +272,9 @@ def _by_the_tree(
     )
     touching = bool(dynamics.mechanism.contacts)
     borne, summed = (np.array(values) if touching else None for values in (forces, sums))
-    return Routed(record_of(times, records), works, borne, summed)
-
-
-def _by_the_bodies(
-    bodies: ContactBodies,
-    second: MaximalCoordinates,
-    path: _Path,
-    times: Array,
-    states: Array,
-    stretches: Sequence[int],
-    works: Array,
-) -> Routed:
-    """Motion and forces of the second route along a path with these states, as those of the first, without sums."""
-    samples = []
-    for state, number in zip(states, stretches, strict=True):  # one after the other, for the last states are kept
-        mode = bodies.acting(path.stretches[number], state)
-        samples.append((*bodies.forces(state, mode), bodies.equations.switched(state, mode)))
-    pressed, wrenches, switched = zip(*samples, strict=True)
-    record = second.recorded(times, states[:, :-1], switched, wrenches)
-    return Routed(record, works, np.array(pressed) if bodies.equations.mechanism.contacts else None)
+    return Routed(
+        record_of(times, records), np.full((len(times), len(working(dynamics.mechanism))), np.nan), borne, summed
+    )
 
 
 def _between(tree: ContactTree, route: HybridRoute[ContactMode], path: _Path) -> Routed | None:
@@ -279,8 +283,7 @@ def _between(tree: ContactTree, route: HybridRoute[ContactMode], path: _Path) ->
     if not lasting:
         return None
     times = np.array([path.stretches[k].middle for k in lasting])
-    works = np.full((len(times), len(working(tree.dynamics.mechanism))), np.nan)
-    return _by_the_tree(tree, path, times, states_of(route, path, times, lasting), lasting, works)
+    return _by_the_tree(tree, path, times, states_of(route, path, times, lasting), lasting)
 
 
 def _sums_along(placed: Placed, pressed: Array) -> Array:

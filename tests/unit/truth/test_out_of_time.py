@@ -5,19 +5,23 @@ from __future__ import annotations
 import dataclasses
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import ended_early
 from proofroll.core.pace import PACE
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import EngineFacts, Result, Status
 from proofroll.running.identity import resolve
 from proofroll.running.run_case import run
 from proofroll.running.store import Store
 from proofroll.studies.cases import case_of
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 
 TIMES = np.linspace(0.0, 1.0, 101)
 
@@ -55,6 +59,31 @@ def test_a_limit_keeps_what_came_before(name: str, parameters: dict[str, float])
     bar = float(cut["positions"].attrs["error_bar"]) + float(whole["positions"].attrs["error_bar"])
     same = np.abs(cut["positions"].to_numpy() - whole["positions"].to_numpy()[: len(cut.time)])
     assert same.max() <= max(bar, 1e-12)
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize("name", ["pendulum_friction", "double_pendulum"])
+def test_samples_that_would_take_too_long_are_left_out(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A truth whose samples do not fit in its limit has those that do, with the same values, and says why it ends."""
+    scene, times, clock = load_scene(name), TIMES[:61], [0.0]
+    whole = truth(scene, times)
+    recorded = MaximalCoordinates.recorded
+
+    def slow(route: MaximalCoordinates, times: FloatArray, *others: Any) -> Record:
+        clock[0] += 0.12 * len(times)
+        return recorded(route, times, *others)
+
+    monkeypatch.setattr("proofroll.core.pace.time.process_time", lambda: clock[0])
+    monkeypatch.setattr(MaximalCoordinates, "recorded", slow)
+    with PACE.limited(6.0):
+        cut = truth(scene, times)
+    count, (end, reason) = len(cut.time), ended_early(cut) or (0.0, "")
+    assert PACE.over
+    assert reason == "its limit of 6 s of processor time was reached"
+    assert end > cut.time[-1]
+    assert 5 <= count < len(times)
+    assert clock[0] <= 6.0
+    np.testing.assert_array_equal(cut["positions"], whole["positions"][:count])
 
 
 @pytest.mark.drill

@@ -94,7 +94,7 @@ def test_chosen_rows_that_become_dependent_are_exchanged(scene):
 
 def grown(route, path, times):
     """Stands for a motion that a small change of the start leads anywhere."""
-    return np.full(len(times), 1e12), route._bodies_at(path, times)
+    return np.full(len(times), 1e12), route._bodies.within(path.stretches[0], times)[:, :-1]
 
 
 def wound_up():
@@ -149,8 +149,9 @@ def test_the_bar_has_what_round_off_grows_to(scene, monkeypatch):
     nearby = _SmoothTruth._nearby
 
     def farther(route, path, times):
-        growth, record = nearby(route, path, times)
-        return growth, replace(record, p_WB=record.p_WB + 1e-2 * (times > 0)[:, None, None])
+        growth, states = nearby(route, path, times)
+        states[:, 0] += 1e-2 * (times > 0) / route._units.length
+        return growth, states
 
     monkeypatch.setattr(_SmoothTruth, "_nearby", farther)
     found = find_truth(scene("double_pendulum"), np.array([0.0, 0.2]))

@@ -1,9 +1,10 @@
 """Route 2 of a mechanism that switches: separate bodies, modes of contacts and laws of joints found by trial."""
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contact.free_slides import FreeSlides, acting_ones
@@ -27,6 +28,7 @@ from proofroll.elements.mechanism.contact.sequences import groups_of
 from proofroll.elements.mechanism.contact.start import closed_and_still, start_digits
 from proofroll.elements.mechanism.contact.touching import Touching
 from proofroll.elements.mechanism.dynamics.analysis import RANK
+from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.scene.rotations import Array, cross, frame_of_axis
 from proofroll.truth.bodies.body_impacts import ImpactLaw, impulses_in_turn
 from proofroll.truth.bodies.contact_body_symbols import BodySymbols
@@ -38,6 +40,7 @@ from proofroll.truth.bodies.contact_equations import (
     slides_of,
 )
 from proofroll.truth.bodies.contact_trials import SLACK, all_held, consistent, follow, next_trial, provisional
+from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.numerics.hybrid import Transition
 from proofroll.truth.switching.contact_guards import SolvedContacts, pressing, sharing
 from proofroll.truth.switching.contact_stretches import ContactStretches
@@ -71,7 +74,8 @@ class ContactBodies(ContactStretches):
 
     def bodies(self, state: Array) -> BodyStates:
         """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
-        return self.equations.equations.poses(state[:-1])
+        p, v, turned, w = self.equations.equations.poses(state[:-1])
+        return p, v, Rotation.from_matrix(turned).as_quat(scalar_first=True), w
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
@@ -410,6 +414,18 @@ class ContactBodies(ContactStretches):
         """Forces and moments of contacts, and wrenches on the bodies; see :meth:`.ContactEquations.applied`."""
         bodies = self.equations.at(self.equations.equations.normalised(state), features_of(mode))
         return self.equations.applied(bodies, self.equations.accelerated(bodies, mode).force)
+
+    def recorded(
+        self, second: MaximalCoordinates, times: Array, states: Array, modes: Iterable[ContactMode]
+    ) -> tuple[Record, Array]:
+        """Record at times, by rows of all joints, and forces and moments of contacts, (times, contacts, 6)."""
+        samples = [  # one after the other, for the last states are kept
+            (*self.forces(state, mode), self.equations.switched(state, mode))
+            for state, mode in zip(states, modes, strict=True)
+        ]
+        pressed, wrenches, switched = zip(*samples, strict=True)
+        functions = self.equations.equations.functions
+        return second.recorded(times, states[:, :-1], switched, wrenches, functions), np.array(pressed)
 
     def _touching(self, state: Array, features: Features | None) -> Sequence[Touching]:
         return self.equations.at(state, features).touching

@@ -7,7 +7,6 @@ DOP853 with projection: the rank is fixed at the start, and violations are elimi
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,7 +17,6 @@ from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import uneven
-from proofroll.core.errors import Missing
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.dynamics.named_forces import joint_force_shares, lengths, named_forces, pick_named
@@ -26,10 +24,9 @@ from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.elements.mechanism.scene.kinks import Functions
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.shapes.walls.formula import RecordedProgram, cos, sin
-from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.bodies.constraint_rows import ConstraintRow
 from proofroll.truth.bodies.maximal_equations import FUNCTIONS, ConstrainedEquations, MaximalEquations, Switched
-from proofroll.truth.bodies.maximal_taylor import MaximalTaylor, Visited, compiled_powers
+from proofroll.truth.bodies.maximal_taylor import MaximalTaylor, Visited
 from proofroll.truth.numerics.scalars import Scalar
 
 # Initial displacement for growth, m, rad and relative to velocities: far above round-off, small if grown by 1e7.
@@ -38,6 +35,7 @@ RANK = 1e-8  # see analysis.RANK; this route determines its own rank
 # Least singular value of chosen rows relative to that of all rows, below which other rows are chosen. Each factor of
 # ten costs a digit of the accelerations; a choice by pivoting begins above 0.1, and is compiled anew, in seconds.
 WEAKEST = 0.02
+_TOGETHER = 500  # states whose rows are formed at once: as many as memory holds for any mechanism
 
 
 @dataclass(frozen=True)
@@ -74,10 +72,10 @@ class NumericEquations:
         self._inverse_root = np.linalg.inv(np.linalg.cholesky(mass)).T
         self.rank = int(self.ranks(self.equations.start()))
 
-    def switched(self, switched: Switched, rank: int) -> NumericEquations:
+    def switched(self, switched: Switched, rank: int, functions: Functions) -> NumericEquations:
         """Copy of the equations with joints held or pushed; ``rank``: of all rows, with those of held joints."""
         equations = copy(self)
-        equations._switched, equations.rank = switched, rank
+        equations._switched, equations.rank, equations.functions = switched, rank, functions
         return equations
 
     def ranks(self, state: Array, switched: Switched | None = None) -> Array:
@@ -190,16 +188,10 @@ class NumericEquations:
         places = [kept.get(number, row.residual) for number, row in zip(joints, rows, strict=True)]
         return _stacked(places, shape), rates
 
-    def poses(self, state: Array) -> tuple[Array, Array, Array, Array]:
-        """Places, velocities, quaternions and angular velocities of all bodies, world axes."""
-        R, r, v, w = self.placed(self.normalised(state))
-        arm = np.einsum("nij,nj->ni", R, np.array([body.com for body in self.equations.mechanism.bodies]))
-        return r - arm, v - np.cross(w, arm), Rotation.from_matrix(R).as_quat(scalar_first=True), w
-
-    def poses_at(self, states: Array) -> tuple[Array, Array, Array, Array]:
-        """Places, velocities, rotations and angular velocities at states, each (states, bodies, …), world axes."""
-        R, r, v, w = self.placed(self.normalised(states), SMOOTH)
-        arm = np.einsum("tnij,nj->tni", R, np.array([body.com for body in self.equations.mechanism.bodies]))
+    def poses(self, state: Array, functions: Functions = FUNCTIONS) -> tuple[Array, Array, Array, Array]:
+        """Places, velocities, rotations and angular velocities at a state or several, (…, bodies, …), world axes."""
+        R, r, v, w = self.placed(self.normalised(state), functions)
+        arm = np.einsum("...nij,nj->...ni", R, np.array([body.com for body in self.equations.mechanism.bodies]))
         return r - arm, v - np.cross(w, arm), R, w
 
     def placed(self, state: Array, functions: Functions = FUNCTIONS) -> tuple[Array, Array, Array, Array]:
@@ -333,20 +325,18 @@ class MaximalCoordinates:
         """Poses of this route at time 0."""
         return self.recorded(np.zeros(1), self.lean.equations.start()[None])
 
-    def take_functions(self, functions: Functions) -> None:
-        """Takes functions of formulas for records, which may hold the sides of kinks."""
-        self._whole.functions = functions
-
     def recorded(
         self,
         times: Array,
         states: Array,
         switched: Sequence[Switched] | None = None,
         applied: Sequence[Array] | None = None,
+        functions: Functions = FUNCTIONS,
     ) -> Record:
         """Record of the states, with the modes of switched joints; reactions follow from the rows in space.
 
-        ``applied``: additional forces and moments about the centres of mass, world axes, (bodies, 6).
+        ``applied``: additional forces and moments about the centres of mass, world axes, (bodies, 6). ``functions``: of
+        formulas, which may hold the sides of kinks.
         """
         lean = self.lean.equations
         units, n = self.lean.normalised(states), len(self.mechanism.bodies)
@@ -358,7 +348,7 @@ class MaximalCoordinates:
         named, residual = np.zeros((len(times), len(named_forces(self.mechanism)))), np.zeros((len(times), 2))
         u = whole[:, self._whole.equations.nx :][:, : self._whole.equations.nu]
         for chosen, mode, rank in self._alike(whole, [Switched()] * len(times) if switched is None else switched):
-            equations = self._whole.switched(mode, rank)
+            equations = self._whole.switched(mode, rank, functions)
             solved = equations.solve(whole[chosen], times[chosen], None if loads is None else loads[chosen])
             opening = solved.equations.opening(_product(solved.C, u[chosen]))
             wrench[chosen], named[chosen] = self._wrenches(solved), self._named(solved, mode)
@@ -389,36 +379,21 @@ class MaximalCoordinates:
         for number, mode in enumerate(switched):
             kind = int(ranks[number]), mode.held, mode.stopped, tuple(mode.push), tuple(mode.clamped)
             groups.setdefault(kind, []).append(number)
-        for chosen in groups.values():
+        blocks = (same[k : k + _TOGETHER] for same in groups.values() for k in range(0, len(same), _TOGETHER))
+        for chosen in blocks:
             first, modes = switched[chosen[0]], [switched[number] for number in chosen]
             push = {key: np.array([mode.push[key] for mode in modes]) for key in first.push}
             clamped = {key: np.array([mode.clamped[key] for mode in modes]) for key in first.clamped}
             yield chosen, Switched(first.held, first.stopped, push, clamped), int(ranks[chosen[0]])
 
-    def reactions(self, time: float, state: Array, switched: Switched, applied: Array) -> tuple[Array, Array]:
-        """Reactions (joints + loops, 6) and named forces at a state of :meth:`recorded` with unit quaternions."""
-        whole = self._complete(*self.lean.placed(state), state[self.lean.equations.nx + self.lean.equations.nu :])
-        rank = int(self._whole.ranks(whole, switched)) if switched.held else self._whole.rank
-        solved = self._whole.switched(switched, rank).solve(whole, time, applied)
-        return self._wrenches(solved), self._named(solved, switched)
-
     def powers(self, times: Array, states: Array) -> Array:
         """Power of each of :func:`.working` at states [W], (times, drives)."""
         joints = [self.mechanism.joint_index[name] for name in working_joints(self.mechanism)]
-        forces = [item for _, item in working(self.mechanism)]
-        driven = [self.mechanism.joint_index[joint.name] for joint, _, _ in self.mechanism.prescribed]
-        places = [driven.index(item.number) if item.field == "drive" else item.number for item in forces]
-        fields = [item.field for item in forces]
-        with suppress(Missing):
-            if not self.lean.moved_alone():
-                raise Missing("forces of drives that independent rows determine")
-            compiled = compiled_powers(
-                self.lean.equations, self.lean.independent_rows(), list(zip(fields, places, joints, strict=True))
-            )
-            unit = np.array([self.lean.normalised(y) for y in states])
-            return compiled(np.column_stack([unit, times]))
-        named = self._named(self.lean.solve(self.lean.normalised(states), times), Switched())
-        return named[:, [number for number, _ in working(self.mechanism)]] * self.lean.along(states, joints)[1]
+        numbers, powers = [number for number, _ in working(self.mechanism)], np.zeros((len(times), len(joints)))
+        for block in (slice(k, k + _TOGETHER) for k in range(0, len(times), _TOGETHER)):
+            solved = self.lean.solve(self.lean.normalised(states[block]), times[block])
+            powers[block] = self._named(solved, Switched())[:, numbers] * self.lean.along(states[block], joints)[1]
+        return powers
 
     @staticmethod
     def _complete(R: Array, r: Array, v: Array, w: Array, angles: Array) -> Array:
@@ -455,7 +430,7 @@ class MaximalCoordinates:
         fields["drive"][..., driven] = multipliers[..., solved.equations.moved]
         holding = dict(zip(switched.held, multipliers.T[solved.equations.moved.stop :], strict=True))
         for number, joint in enumerate(self.mechanism.joints):
-            force = holding.get(number, switched.push.get(number, 0.0))
+            force: Scalar = holding.get(number, switched.push.get(number, 0.0))
             on = joint_force_shares(number in switched.stopped, joint.friction, force)
             fields["friction"][..., number], fields["stop"][..., number] = on
         return pick_named(self.mechanism, fields).T.reshape(*shape, -1)

@@ -17,9 +17,9 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.bodies.constraint_rows import ConstraintRow
 from proofroll.truth.bodies.maximal_equations import ConstrainedEquations, MaximalEquations
-from proofroll.truth.numerics.compiled_once import compiled_once, heyoka
+from proofroll.truth.numerics.compiled_once import heyoka
 from proofroll.truth.numerics.elimination import Row, eliminated
-from proofroll.truth.numerics.scalars import Scalar, add, mul, sub
+from proofroll.truth.numerics.scalars import Scalar, sub
 
 # Integrator, time [s] and state before each step.
 Visited = list[tuple["MaximalTaylor", Scalar, Array]]
@@ -107,48 +107,12 @@ def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable
         Missing: heyoka is not installed.
     """
     state, rates = _in_symbols(equations, rows)
-    return _of_states(heyoka.cfunc([_expression(value, float) for value in rates], state, compact_mode=True))
-
-
-def compiled_powers(
-    equations: MaximalEquations, rows: Sequence[int], forces: Sequence[tuple[str, int, int]]
-) -> Callable[[Array], Array]:
-    """Compiled powers of efforts and drives at many states; the last column is the time [s]: (states, n + 1) -> [W].
-
-    ``forces``: field (``effort`` or ``drive``), index of the actuator or prescribed motion, and index of the joint.
-
-    Raises:
-        Missing: heyoka is not installed, or a drive is not among the independent ``rows``.
-    """
-    state, at_state, functions = _at_symbols(equations)
-    moved = {number: at_state.moved.start + number for field, number, _ in forces if field == "drive"}
-    if not set(moved.values()) <= set(rows):
-        raise Missing("a drive whose force is not determined by independent rows")
-    multipliers = _solved(equations, at_state, rows)[1] if moved else []
-    u, powers = state[equations.nx : equations.nx + equations.nu], list[Scalar]()
-    made = equations.rate_rows(state[:-1], [joint for _, _, joint in forces], functions)
-    for (field, number, _), row in zip(forces, made, strict=True):
-        rate = add(*(mul(value, u[k]) for k, value in row.coefficients.items()))
-        force = at_state.efforts[number] if field == "effort" else multipliers[list(rows).index(moved[number])]
-        powers.append(mul(force, rate))
-    return _of_states(compiled_once([_expression(value, float) for value in powers], state, by_collocation=True).values)
-
-
-def _of_states(function: Any) -> Callable[[Array], Array]:
-    """Compiled function of many states at once."""
+    function = heyoka.cfunc([_expression(value, float) for value in rates], state, compact_mode=True)
     return lambda states: np.asarray(function(np.ascontiguousarray(states.T)).T)
 
 
 def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any = None) -> tuple[list[Any], list[Scalar]]:
-    """Variables of a state, with a time of their own unless there is one, and its rates as expressions in them."""
-    state, at_state, _ = _at_symbols(equations, time)
-    return state, [*at_state.rate, *_solved(equations, at_state, rows)[0], *at_state.angle_rate]
-
-
-def _at_symbols(
-    equations: MaximalEquations, time: Any = None
-) -> tuple[list[Any], ConstrainedEquations, dict[str, Any]]:
-    """Variables of a state, with a time of their own unless there is one, the equations there, and the functions.
+    """Variables of a state, with a time of their own unless there is one, and its rates as expressions in them.
 
     Raises:
         Missing: heyoka is not installed.
@@ -159,15 +123,9 @@ def _at_symbols(
     state = [heyoka.make_vars(f"s{index}") for index in range(len(equations.start()))]
     own_time = [heyoka.make_vars("t")] if time is None else []
     at_state = equations.at(state, functions, time=own_time[0] if own_time else time)
-    return [*state, *own_time], at_state, functions
-
-
-def _solved(
-    equations: MaximalEquations, at_state: ConstrainedEquations, rows: Sequence[int]
-) -> tuple[list[Scalar], list[Scalar]]:
-    """Accelerations, and multipliers of independent rows."""
     system = BodySystem(equations, at_state, [at_state.rows[k] for k in rows], number=_exact)
-    return system.accelerated(at_state.force)[:2]
+    acceleration = system.accelerated(at_state.force)[0]
+    return [*state, *own_time], [*at_state.rate, *acceleration, *at_state.angle_rate]
 
 
 def _exact(value: float) -> Any:

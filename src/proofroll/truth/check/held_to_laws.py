@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -36,10 +36,10 @@ def of_tree(
     """A path of the first route; ``mechanism`` in SI units."""
     dynamics = tree.dynamics
 
-    def named_at(state: Array, mode: ContactMode) -> Array:
-        q, v, time = dynamics.parts(state)
-        named: Array = dynamics.sample(q, v, mode, time)[0]["named"]
-        return np.nan_to_num(named)  # what is not determinate does no work
+    def named_at(states: Array, modes: Iterable[ContactMode]) -> Array:
+        parts = ((*dynamics.parts(state), mode) for state, mode in zip(states, modes, strict=True))
+        named = [dynamics.sample(q, v, mode, time)[0]["named"] for q, v, time, mode in parts]
+        return np.asarray(np.nan_to_num(named))  # what is not determinate does no work
 
     return LawRecorder(mechanism, units, tree, path, held_path, named_at)
 
@@ -54,10 +54,8 @@ def of_bodies(
 ) -> LawRecorder:
     """A path of the second route; ``second``: its equations of all joints."""
 
-    def named_at(state: Array, mode: ContactMode) -> Array:
-        wrenches, switched = bodies.forces(state, mode)[1], bodies.equations.switched(state, mode)
-        second.take_functions(bodies.equations.equations.functions)
-        return second.reactions(float(state[-1]), state[:-1], switched, wrenches)[1]
+    def named_at(states: Array, modes: Iterable[ContactMode]) -> Array:
+        return bodies.recorded(second, states[:, -1], states, modes)[0].named
 
     return LawRecorder(mechanism, units, bodies, path, held_path, named_at)
 

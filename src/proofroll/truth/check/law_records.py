@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -17,6 +17,7 @@ from proofroll.elements.mechanism.contact.rolling_and_spin import TurningFrictio
 from proofroll.elements.mechanism.dynamics.link_forces import working
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array
+from proofroll.elements.mechanism.scene.signal import SMOOTH
 from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.check.laws.integrals import POINTS, RESOLVED, TO_SERIES, of_quaternion
 from proofroll.truth.check.laws.record import Modes, Passage, Pieces, stated
@@ -92,9 +93,9 @@ class LawRecorder:
         route: ContactTree | ContactBodies,
         path: HybridPath[Stretch[ContactMode]],
         held_path: HeldPath | None,
-        named_at: Callable[[Array, ContactMode], Array],
+        named_at: Callable[[Array, Iterable[ContactMode]], Array],
     ) -> None:
-        """Takes a mechanism in SI units; ``named_at``: named forces at a state of the route in a mode."""
+        """Takes a mechanism in SI units; ``named_at``: named forces at states of the route in modes."""
         self._mechanism, self._units, self._route, self._named_at = mechanism, units, route, named_at
         self.path, self.held, self.second = path, held_path, units.time
         self._moment = units.force * units.length
@@ -131,17 +132,13 @@ class LawRecorder:
 
     def _forces_of_drives(self, stretch: Stretch[ContactMode], states: Array) -> Array:
         """Forces of drives at states of a stretch, (states, drives), in natural units."""
-        acting = self._route.acting
-        return np.array(
-            self._route.in_stretch(
-                stretch, lambda: [self._named_at(state, acting(stretch, state))[self._drives] for state in states]
-            )
-        )
+        modes = (self._route.acting(stretch, state) for state in states)
+        return self._route.in_stretch(stretch, lambda: self._named_at(states, modes)[:, self._drives])
 
     def _poses(self, states: Array) -> Array:
         """Values of the bodies at states, (states, 18 bodies), in the order of a record."""
         if isinstance(self._route, ContactBodies):
-            p, v, turned, w = self._route.equations.equations.poses_at(states[:, :-1])
+            p, v, turned, w = self._route.equations.equations.poses(states[:, :-1], SMOOTH)
         else:
             p, v, quaternions, w = map(np.array, zip(*map(self._route.bodies, states), strict=True))
             turned = of_quaternion(quaternions)

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import uneven
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.pace import PACE
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.contact.start import natural_scale
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.analysis import RowSign, analyse, singular_values
@@ -123,7 +125,7 @@ class _SmoothTruth:
             if self._exact is None:
                 raise
             return self._by_form(self._exact)
-        return motion if self._exact is None or np.isinf(motion.end) else self._by_form(self._exact)
+        return motion if self._exact is None or np.isinf(motion.end) or PACE.over else self._by_form(self._exact)
 
     def _by_routes(self) -> TwoRouteMotion:
         """Motion that two routes follow, up to the first failure of either.
@@ -132,23 +134,31 @@ class _SmoothTruth:
             Diverged: none of the times is known.
         """
         units, early, form = self._units, EarlyEnd(), self._exact
-        paths = followed(self._tree, self._bodies, self._until, (), smooth=True)
+        paths = followed(self._tree, self._bodies, self._until, ())
         early.at(*self._end_of(paths))
-        if form is not None and np.isfinite(early.time):
+        if form is not None and np.isfinite(early.time) and not PACE.over:
             raise Diverged(early.reason, early.time)  # the closed form goes on
-        growth, nearby = early.run(partial(self._nearby, paths[1]), self._times)
-        count = len(growth)
-        times = self._times[:count]
-        by_tree, by_bodies = self._tree_at(paths[0], times), self._bodies_at(paths[1], times)
+        growth, near = early.run(partial(self._nearby, paths[1]), self._times)
+        chaotic = growth * NUDGE > CHAOS
+        beside = early.run(partial(self._tree_beside, paths[0]), self._times) if chaotic.any() else None
+
+        def sampled(times: Array) -> tuple[Record, Record, Record, Array]:
+            """Motion of both routes at known times, neighbouring one of the second, growth to one of the first."""
+            growth = np.full(len(times), np.inf) if beside is None else self._growth_of_tree(beside, paths[0], times)
+            nearby = self._in_seconds(self._second.recorded(times, near[np.searchsorted(self._times, times)]))
+            return self._tree_at(paths[0], times), self._bodies_at(paths[1], times), nearby, growth
+
+        known = early.known(self._times)
+        count = PACE.fitting(known, sampled)
+        if count < len(known):
+            early.at(float(known[count]), PACE.reason)
+        times = known[:count]
+        by_tree, by_bodies, nearby, growth = sampled(times)
+        chaotic = chaotic[:count] & (growth * NUDGE > CHAOS)
         by_bodies = on_same_turns(self._mechanism, by_tree, by_bodies)
         self._check_energy(by_tree, "joint coordinates", early, partial(self._tree_at, paths[0]))
         self._check_energy(by_bodies, "maximal coordinates", early, partial(self._bodies_beside, paths[1], by_tree))
-        chaotic = growth * NUDGE > CHAOS
-        if chaotic.any():
-            by_the_tree = early.run(partial(self._growth_of_tree, paths[0]), self._times)
-            count = len(by_the_tree)
-            chaotic = chaotic[:count] & (by_the_tree * NUDGE > CHAOS)
-        self._check_branch(by_tree.first(count), by_bodies.first(count), chaotic, early, paths)
+        self._check_branch(by_tree, by_bodies, chaotic, early, paths)
         count = len(early.known(self._times))
         by_tree, by_bodies = by_tree.first(count), by_bodies.first(count)
         best, nearby = by_bodies, on_same_turns(self._mechanism, by_bodies, nearby.first(count))
@@ -224,7 +234,7 @@ class _SmoothTruth:
     def _reason(self, end: float, reason: str) -> str:
         """Reason of an early end: the singular pose there, if there is one."""
         step = max(min(_POSE_STEP, end / 200), end / _MOST_STEPS)
-        if not reason or not step > 0:
+        if not reason or not step > 0 or PACE.over:
             return reason
         try:
             poses = singular_poses(self._equations.mechanism, end + 2 * step, step)
@@ -273,8 +283,8 @@ class _SmoothTruth:
             return None
         return form.title, float(largest(form.part(best.time) - form.same(best)).max())
 
-    def _nearby(self, path: FollowedPath, times: Array) -> tuple[Array, Record]:
-        """Growth of the distance to a neighbouring motion of the second route, and that motion.
+    def _nearby(self, path: FollowedPath, times: Array) -> tuple[Array, Array]:
+        """Growth of the distance to a neighbouring motion of the second route, and the states of that.
 
         The start is displaced in all directions that the rows allow, by far more than round-off. The growth is a
         multiple of that.
@@ -287,18 +297,22 @@ class _SmoothTruth:
         walked = self._bodies.walk(0.0, start, stretch.mode, float(times[-1]))
         near = self._bodies.within(walked, times)
         apart = np.abs(near - self._bodies.within(stretch, times))[:, : lean.equations.nx].max(axis=1)
-        return apart / BESIDE, self._in_seconds(self._second.recorded(times, near[:, :-1]))
+        return apart / BESIDE, near[:, :-1]
 
-    def _growth_of_tree(self, path: FollowedPath, times: Array) -> Array:
-        """Growth of that distance of the first route, by the poses of its bodies."""
+    def _tree_beside(self, path: FollowedPath, times: Array) -> Stretch[ContactMode]:
+        """Neighbouring motion of the first route up to the last of some times."""
         tree, equations, stretch = self._tree, self._equations, path.stretches[0]
         q, v, _ = tree.dynamics.parts(stretch.first)
         ways = BESIDE * uneven(len(v))
         start = np.concatenate([equations.tree.moved(q, ways), v * (1.0 + ways)])
         for _ in range(3):  # Newton's method doubles the number of digits
             start = equations.eliminated(start)
-        nearby = tree.walk(0.0, np.append(start, 0.0), stretch.mode, float(times[-1]))
-        moved, record = (equations.recorded(times, tree.within(item, times)[:, :-1]) for item in (nearby, stretch))
+        return tree.walk(0.0, np.append(start, 0.0), stretch.mode, float(times[-1]))
+
+    def _growth_of_tree(self, beside: Stretch[ContactMode], path: FollowedPath, times: Array) -> Array:
+        """Growth of that distance of the first route, by the poses of its bodies."""
+        states = (self._tree.within(stretch, times)[:, :-1] for stretch in (beside, path.stretches[0]))
+        moved, record = (self._equations.recorded(times, values) for values in states)
         return _apart(moved, record) / BESIDE
 
     def _path_of_form(self, spans: Sequence[tuple[float, float]]) -> FollowedPath:

@@ -62,6 +62,10 @@ class HeldPath:
     def again(self) -> None:
         """Begins another path."""
         self._commands, self._times, self._past = Commands(self._si), [], []
+        self.resume()
+
+    def resume(self) -> None:
+        """Lets held signals have their present values again, after :meth:`finish`."""
         for cell in self.own.cells:
             cell.past = None
 
