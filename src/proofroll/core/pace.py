@@ -11,8 +11,10 @@ from proofroll.core.errors import Diverged
 _EVERY = 1.0  # s of processor time between two messages
 _TELLING = 0.01  # part of a route from which its pace is told: the first steps are shorter than those to come
 AT = "truth at "  # beginning of a line that a worker prints about it
-# Route -> part of the limit that is used when it ends; then motions are held against laws, followed again, and sampled.
-_ROUTES = {"first": 0.275, "second": 0.55, "steps": 1.0}
+# Route -> part of the limit that is used when it ends; then motions are held against laws, and sampled. Where nothing
+# switches both are followed again from a start beside.
+_ROUTES = {"first": 0.4, "second": 0.8, "steps": 1.0}
+_SMOOTH = 0.6875
 # Processor time of a sample [s] that all but the dearest need; number of samples by which a time is foretold.
 _SAMPLE, _FEW = 0.1, 16
 _CHECKED = "its end, held against the laws"
@@ -38,7 +40,7 @@ class Pace:
         self.text, self.reason, self.over, self.until, self.aloud = "", "", False, 0.0, False
         self._tell: Callable[[str], object] = str
         self._limit, self._began = math.inf, 0.0
-        self._route, self._begun, self._end, self._told = "", (0.0, 0.0), math.inf, 0.0
+        self._route, self._begun, self._end, self._told, self._part = "", (0.0, 0.0), math.inf, 0.0, 1.0
 
     @contextmanager
     def limited(self, seconds: float, tell: Callable[[str], object] = str) -> Iterator[None]:
@@ -58,9 +60,13 @@ class Pace:
             self._route = self.text = ""
             self._tell("")  # what was told before is over
 
-    def follow(self, route: str, end: float) -> None:
-        """Begins the ``first`` or ``second`` route, or the only one by ``steps``, to an end in its own unit of time."""
+    def follow(self, route: str, end: float, *, smooth: bool = False) -> None:
+        """Begins the ``first`` or ``second`` route, or the only one by ``steps``, to an end in its own unit of time.
+
+        ``smooth``: nothing switches.
+        """
         self._route, self._begun, self._end = route, (time.process_time(), -1.0), end
+        self._part = _ROUTES[route] * (_SMOOTH if smooth else 1.0)
 
     def fitting(self, times: Any, sample: Callable[[Any], object]) -> int:
         """Number of the first of some times, at least one, for whose samples the limit leaves processor time.
@@ -93,7 +99,7 @@ class Pace:
         if not self._route:
             return
         used, part = time.process_time(), t / self._end
-        if used - self._began > _ROUTES[self._route] * self._limit:
+        if used - self._began > self._part * self._limit:
             self.over = True
             raise OutOfTime(self.reason, t)
         if self._begun[1] < 0:  # what came before, like compiling, says nothing of the pace

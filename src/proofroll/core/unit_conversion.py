@@ -16,29 +16,12 @@ _SPELT: Mapping[str, str] = {
 }  # fmt: skip
 # Unit -> SI unit and the factor to it.
 _CONVERTED: Mapping[str, tuple[str, float]] = {
-    "deg": ("rad", math.pi / 180),
-    "deg/s": ("rad/s", math.pi / 180),
-    "deg/s^2": ("rad/s^2", math.pi / 180),
-    "rpm": ("rad/s", math.pi / 30),
-    "g": ("kg", 1e-3),
-    "km": ("m", 1e3),
-    "cm": ("m", 1e-2),
-    "mm": ("m", 1e-3),
-    "cm/s": ("m/s", 1e-2),
-    "mm/s": ("m/s", 1e-3),
-    "km/h": ("m/s", 1 / 3.6),
-    "h": ("s", 3600.0),
-    "min": ("s", 60.0),
-    "ms": ("s", 1e-3),
-    "µs": ("s", 1e-6),
-    "kN": ("N", 1e3),
-    "mN": ("N", 1e-3),
-    "kN m": ("N m", 1e3),
-    "N cm": ("N m", 1e-2),
-    "N mm": ("N m", 1e-3),
-    "kJ": ("J", 1e3),
-    "mJ": ("J", 1e-3),
-}
+    "deg": ("rad", math.pi / 180), "deg/s": ("rad/s", math.pi / 180), "deg/s^2": ("rad/s^2", math.pi / 180),
+    "rpm": ("rad/s", math.pi / 30), "g": ("kg", 1e-3), "km": ("m", 1e3), "cm": ("m", 1e-2), "mm": ("m", 1e-3),
+    "cm/s": ("m/s", 1e-2), "mm/s": ("m/s", 1e-3), "km/h": ("m/s", 1 / 3.6), "h": ("s", 3600.0), "min": ("s", 60.0),
+    "ms": ("s", 1e-3), "µs": ("s", 1e-6), "kN": ("N", 1e3), "mN": ("N", 1e-3), "kN m": ("N m", 1e3),
+    "N cm": ("N m", 1e-2), "N mm": ("N m", 1e-3), "kJ": ("J", 1e3), "mJ": ("J", 1e-3),
+}  # fmt: skip
 
 _SI = {"1", "rad", "m", "kg", "s", "N", "J", "W", "Hz"}
 

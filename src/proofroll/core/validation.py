@@ -127,10 +127,9 @@ def _first_problem(
         return no_such_key(f"{place}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], keys))
     if absent:
         # a type in the place of a key is one of several that the table might be, whose keys may be another's
-        plain = [
-            entry for entry in error.errors() if is_absent(entry) and located(entry) == ".".join(map(str, entry["loc"]))
-        ]
-        others = "".join(f", {name}" for name in map(located, plain) if name != location)
+        plain = {".".join(map(str, entry["loc"])) for entry in error.errors() if is_absent(entry)}
+        names = [name for name in map(located, error.errors()) if name in plain - {location}]
+        others = "".join(f", {name}" for name in names)
         return InputError(f"{place}: {location}", None, f"this key is required; add it{others}")
     error_found = problem.get("ctx", {}).get("error")
     if isinstance(error_found, OutOfBounds):

@@ -25,14 +25,9 @@ from proofroll.running.memory import VARIABLE, descendants, memory_limit, reside
 _NO_WINDOWS = {"MUJOCO_GL": "disable"}
 # Variables that redirect a Python's imports or start-up; they are meant for this Python, not for another interpreter.
 _OF_THIS_PYTHON = (
-    "PYTHONPATH",
-    "PYTHONHOME",
-    "PYTHONEXECUTABLE",
-    "PYTHONPLATLIBDIR",
-    "PYTHONSTARTUP",
-    "PYTHONUSERBASE",
+    "PYTHONPATH", "PYTHONHOME", "PYTHONEXECUTABLE", "PYTHONPLATLIBDIR", "PYTHONSTARTUP", "PYTHONUSERBASE",
     "__PYVENV_LAUNCHER__",
-)
+)  # fmt: skip
 # Interval at which a worker's memory and life are checked [s]: a check costs less than 0.1 ms; memory fills at GB/s.
 _TICK = 0.1
 # Time that a process may take to end after it closed its answers, for threads and exit handlers [s].

@@ -63,18 +63,25 @@ def refuse_uncovered(mechanism: Mechanism) -> None:
 
 
 def followed(
-    tree_route: HybridRoute[ModeT], body_route: HybridRoute[ModeT], until: float, kinks: Sequence[float]
+    tree_route: HybridRoute[ModeT],
+    body_route: HybridRoute[ModeT],
+    until: float,
+    kinks: Sequence[float],
+    *,
+    smooth: bool = False,
 ) -> tuple[HybridPath[Stretch[ModeT]], HybridPath[Stretch[ModeT]]]:
     """Paths of two routes to ``until``, in natural units; ``kinks``: times at which the rates are not smooth.
+
+    ``smooth``: nothing switches.
 
     Where the first ends early the second is not followed beyond that end, for the truth ends there, too.
     """
     try:
-        PACE.follow("first", until)
+        PACE.follow("first", until, smooth=smooth)
         path = follow(tree_route, until, kinks, CLOSE)
         end = until if path.known else path.stretches[-1].end
         last = min(until, end + _BEHIND * time_accuracy(end))
-        PACE.follow("second", until)
+        PACE.follow("second", until, smooth=smooth)
         return path, follow(body_route, last, kinks, CLOSE, first_close([path], CLOSE))
     finally:
         PACE.leave()

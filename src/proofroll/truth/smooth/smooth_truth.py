@@ -134,7 +134,7 @@ class _SmoothTruth:
             Diverged: none of the times is known.
         """
         units, early, form = self._units, EarlyEnd(), self._exact
-        paths = followed(self._tree, self._bodies, self._until, ())
+        paths = followed(self._tree, self._bodies, self._until, (), smooth=True)
         early.at(*self._end_of(paths))
         if form is not None and np.isfinite(early.time) and not PACE.over:
             raise Diverged(early.reason, early.time)  # the closed form goes on

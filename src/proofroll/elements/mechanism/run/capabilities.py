@@ -82,20 +82,10 @@ _FORCES = ("SPRINGS", "SPRING_LAWS", "BUSHINGS", "APPLIED_FORCES", "JOINT_SPRING
 FORCES = frozenset(MechanismCapability[name] for name in _FORCES)
 # Kind of a geometry -> the capability to let it touch; a sphere of radius 0 is a vertex.
 _SHAPES = {
-    "sphere": "SPHERES",
-    "ellipsoid": "ELLIPSOIDS",
-    "circle": "DISCS",
-    "plane": "PLANES",
-    "box": "BOXES",
-    "capsule": "CAPSULES",
-    "cylinder": "CYLINDERS",
-    "bore": "BORES",
-    "shaft": "SHAFTS",
-    "bowl": "BOWLS",
-    "cone": "CONES",
-    "torus": "TORI",
-    "declared": "DECLARED_WALLS",
-}
+    "sphere": "SPHERES", "ellipsoid": "ELLIPSOIDS", "circle": "DISCS", "plane": "PLANES", "box": "BOXES",
+    "capsule": "CAPSULES", "cylinder": "CYLINDERS", "bore": "BORES", "shaft": "SHAFTS", "bowl": "BOWLS",
+    "cone": "CONES", "torus": "TORI", "declared": "DECLARED_WALLS",
+}  # fmt: skip
 CURVED_WALLS = frozenset(MechanismCapability[_SHAPES[kind]] for kind in CURVED)
 ALL_SHAPES = frozenset(MechanismCapability[name] for name in (*_SHAPES.values(), "VERTICES"))
 
