@@ -202,7 +202,6 @@ class OwnOptions:
         settings: setting -> its value, as text.
         of_contacts: further settings, of formulations that have contacts.
         others: clauses on options that the adapter sets otherwise.
-        others_alone: further ones, of formulations without contacts.
         others_of_contacts: further ones, of formulations with contacts.
         switches: for a reader, an option of the file and another value -> settings with that value.
     """
@@ -212,7 +211,6 @@ class OwnOptions:
     settings: Mapping[str, str]
     of_contacts: Mapping[str, str]
     others: list[str]
-    others_alone: list[str] = field(default_factory=list)
     others_of_contacts: list[str] = field(default_factory=list)
     switches: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 

@@ -242,7 +242,7 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
     such scenes goes first.
 
     Raises:
-        InputError: unknown or ill-typed option.
+        InputError: unknown or ill-typed option, or one that the formulation does not use.
     """
     from proofroll.core.validation import strict, validated  # pydantic takes a while to import
 
@@ -265,4 +265,7 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
     for key in (name for name in options if name not in values):
         raise InputError(f"{engine.name}: {key}", options[key], f"{formulation} does not use it; leave it out")
     strict(kind, finite=True)
-    return validated(kind, {**values, **options}, engine.name)
+    settings = validated(kind, {**values, **options}, engine.name)
+    for key in (name for name in options if name in getattr(settings, "unused", ())):
+        raise InputError(f"{engine.name}: {key}", options[key], f"{formulation} does not use it here; leave it out")
+    return settings

@@ -23,7 +23,7 @@ _READ = {"integrator", "timestep", "cone", "gravity", "density", "viscosity", "d
 _READ |= {"impratio", "sleep_tolerance", "wind", "magnetic", "enableflags", "jacobian"}
 _READ |= {f"{family}_{what}" for family in ("o", "ccd", "sdf") for what in ("friction", "margin", "solref", "solimp")}
 _READ |= {"ccd_iterations", "ccd_tolerance", "sdf_iterations", "sdf_initpoints"}
-_OF_CONTACTS = ("iterations", "noslip_iterations", "solver")  # settings of formulations with contacts alone
+_OF_ROWS = ("iterations", "noslip_iterations", "solver")
 _FINER = 4  # part of the file's step that is tried
 _SOLVERS = {name.upper(): name for name in ("PGS", "CG", "Newton")}
 _HARD = {"time_constant": str(SHORTEST_TIME_CONSTANT), "impedance": str(LARGEST_IMPEDANCE)}
@@ -54,7 +54,7 @@ def own_options(path: Path) -> OwnOptions | None:
     solver = mujoco.mjtSolver(int(option.solver)).name.removeprefix("mjSOL_")
     words = {"solver": f"solver {solver}", "iterations": counted(int(option.iterations), "iterations")}
     clauses = {key: words.get(key, f"{key} {getattr(option, key):g}") for key in unlike}
-    alone = [clauses.pop(key) for key in _OF_CONTACTS if key in clauses]
+    of_rows = [clauses.pop(key) for key in _OF_ROWS if key in clauses]
     others = list(clauses.values())
     bits = mujoco.mjtDisableBit
     others += [f"flag {word}" for name, word in _FLAGS.items() if option.disableflags & getattr(bits, f"mjDSBL_{name}")]
@@ -65,12 +65,12 @@ def own_options(path: Path) -> OwnOptions | None:
         for key in [key for key in dir(element) if key.startswith(("solref", "solimp"))]:
             count = sum(bool(np.any(getattr(item, key) != getattr(element, key))) for item in getattr(spec, kind))
             named += [f"{key.replace('_', '')} of {counted(count, kind)}"] if count else []
-    switches = {"hard contacts in place of soft ones": _HARD}
+    switches = {"hard constraints in place of soft ones": _HARD}
     if _CONES[int(option.cone)] == "pyramidal":
         switches["elliptic cone in place of the pyramidal"] = {"cone": "elliptic"}
-    if alone:
+    if of_rows:
         usual_solver = {"solver": "Newton", "iterations": str(plain.option.iterations), "noslip_iterations": "0"}
-        switches[f"MuJoCo's default solver in place of {', '.join(alone)}"] = usual_solver
+        switches[f"MuJoCo's default solver in place of {', '.join(of_rows)}"] = usual_solver
     euler = integrator == "Euler"  # the only one that the flag is for
     explicit = euler and bool(option.disableflags & bits.mjDSBL_EULERDAMP)
     if euler and not explicit:
@@ -83,17 +83,13 @@ def own_options(path: Path) -> OwnOptions | None:
         settings={
             "integrator": integrator,
             "dt": f"{option.timestep:.12g}",
-            **({"eulerdamp": "False"} if explicit else {}),
-        },
-        of_contacts={
-            "cone": _CONES[int(option.cone)],
-            "impratio": str(float(option.impratio)),
             "solver": _SOLVERS[solver.upper()],
             "iterations": str(option.iterations),
             "noslip_iterations": str(option.noslip_iterations),
+            **({"eulerdamp": "False"} if explicit else {}),
         },
+        of_contacts={"cone": _CONES[int(option.cone)], "impratio": str(float(option.impratio))},
         others=others,
-        others_alone=alone,
         others_of_contacts=of_contacts,
         switches=switches,
     )

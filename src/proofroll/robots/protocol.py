@@ -204,6 +204,7 @@ def _stack(rates: Mapping[str, Array], joints: tuple[str, ...], dofs: tuple[int,
 
 WATCHED = 1.0  # s: duration of the run in which shapes that come near each other are looked for
 OVERLAPPING_DROP = 0.01  # m: height over the floor of a robot that its file lets overlap the floor
+OVERLAP = 1e-6  # m: at the start, that digits of a file make of shapes that touch
 
 
 def lift(lowest: float, drop: float | None) -> float:
@@ -211,8 +212,8 @@ def lift(lowest: float, drop: float | None) -> float:
 
     Args:
         lowest: height of its lowest shape over the floor [m].
-        drop: the height that is asked for [m]; None: as it is, or 1 cm where it overlaps the floor.
+        drop: the height that is asked for [m]; None: as it is, or 1 cm where it overlaps the floor by more than digits.
     """
     if drop is not None:
         return drop - lowest
-    return OVERLAPPING_DROP - lowest if lowest < 0 else 0.0
+    return OVERLAPPING_DROP - lowest if lowest < -OVERLAP else max(-lowest, 0.0)

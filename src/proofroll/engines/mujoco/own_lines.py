@@ -75,8 +75,8 @@ def own_lines(settings: MujocoSettings) -> list[str]:
     spec = mujoco.MjSpec()
     set_integration(spec.option, settings)
     settings.soften(spec.default.equality)
+    settings.set_solver(spec.option, contacts=settings.formulation == "geoms")
     if settings.formulation == "geoms":
-        settings.set_solver(spec.option)
         settings.soften(spec.default.geom)
     spec.compile()
     lines: list[str] = []

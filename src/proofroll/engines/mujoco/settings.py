@@ -31,13 +31,12 @@ POSITIONS_TIME_CONSTANT = 2.25
 # contact by the square of the coefficient: at 100 the ball flies through the wall without a warning.
 UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
+# Options of the solver of loops, couplings, stops, dry friction and contacts.
+_OF_ROWS = ("solver", "iterations", "noslip_iterations")
 # Settings that not every formulation has, by formulation.
 _OWN: Mapping[str, tuple[str, ...]] = {
-    "joints": ("damping_armature",),
-    "geoms": (
-        *("damping_armature", "cone_correction", "cone", "curvature"),
-        *("impratio", "solver", "iterations", "noslip_iterations"),
-    ),
+    "joints": ("damping_armature", *_OF_ROWS),
+    "geoms": ("damping_armature", "cone_correction", "cone", "curvature", "impratio", *_OF_ROWS),
 }
 _SOME = tuple(dict.fromkeys(name for names in _OWN.values() for name in names))
 
@@ -57,8 +56,8 @@ class MujocoSettings:
             (first number of ``solref``), in steps; None: MuJoCo's default of 0.02 s at every step.
         impedance: constant constraint impedance (``solimp``); 1 would be a rigid contact; None: MuJoCo's default,
             0.9 to 0.95 growing with depth.
-        impratio, solver, iterations, noslip_iterations: options of that name in MuJoCo, its defaults by default
-            (``geoms``).
+        impratio: option of that name in MuJoCo, its default by default (``geoms``).
+        solver, iterations, noslip_iterations: the same (``joints``, ``geoms``).
         curvature: True if the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
             out (``geoms`` on curved walls).
         cone_correction: True if the adapter takes from the contacts' reference accelerations the lift that MuJoCo's
@@ -110,10 +109,6 @@ class MujocoSettings:
 
     def rules(self) -> Iterator[tuple[bool, str, str]]:
         """Combinations that MuJoCo would ignore or misread: True if there, name of the setting, advice."""
-        plain, formulation = type(self)(self.formulation), self.formulation
-        reason = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
-        for name in self.unused:
-            yield getattr(self, name) != getattr(plain, name), name, f"{reason}; leave it out"
         # The other integrators have the implicit damping of their own, or none.
         explicit = self.damping_armature and self.integrator != "Euler"
         yield explicit, "integrator", "damping_armature=true needs integrator=Euler"
@@ -157,12 +152,13 @@ class MujocoSettings:
         """MuJoCo's ``solimp``; its width, midpoint and power are the defaults."""
         return (*self.impedances, 1e-3, 0.5, 2.0)
 
-    def set_solver(self, option: Any) -> None:
-        """Sets cone and solver of contacts in the options of an MjSpec or a model."""
-        option.cone = getattr(mujoco.mjtCone, f"mjCONE_{self.cone.upper()}")
+    def set_solver(self, option: Any, *, contacts: bool = True) -> None:
+        """Sets the solver in the options of an MjSpec or a model; ``contacts``: the cone of contacts, too."""
         option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{self.solver.upper()}")
         option.iterations, option.noslip_iterations = self.iterations, self.noslip_iterations
-        option.impratio = self.impratio
+        if contacts:
+            option.cone = getattr(mujoco.mjtCone, f"mjCONE_{self.cone.upper()}")
+            option.impratio = self.impratio
 
     def soften(self, item: Any) -> None:
         """Sets ``solref`` and ``solimp`` of an MjSpec's item, each unless it is MuJoCo's default."""

@@ -124,6 +124,9 @@ def _truth_ends(outcome: Outcome) -> list[str]:
         for name, reference in truths.items()
         if reference.ended
     ]
+    open_names = [name for name in bounds if not all(reference.determines(name) for reference in truths.values())]
+    if open_names and outcome.comparison.budget is not None and not by_steps:
+        ends.append(f"Not determined by the equations, and so not judged: {', '.join(open_names)}.")
     return [*by_steps, *ends]
 
 

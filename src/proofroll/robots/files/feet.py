@@ -30,7 +30,7 @@ from proofroll.robots.files.mjcf.parse import NO_SHAPE
 from proofroll.robots.files.robot_file import RobotFile, read_xml
 from proofroll.robots.files.urdf import BASE_JOINT
 from proofroll.robots.model import NO_BODY, Array, Robot
-from proofroll.robots.protocol import WATCHED
+from proofroll.robots.protocol import OVERLAP, WATCHED
 from proofroll.robots.states import RobotStates
 
 # What a robot stands on: the number of each in the parameter ``ground`` of a scene.
@@ -52,7 +52,6 @@ _RULED = {frozenset(("plane", kind)) for kind in ("sphere", "capsule", "box", "c
 _ON_FACES = ("cylinder", "ellipsoid", "mesh")
 _ROUND = ("sphere", "capsule", "mesh")  # a margin around these, or around the corners of a mesh, is a larger radius
 _MOST_CORNERS = 64  # of the convex hull of a mesh; each is a contact
-_OVERLAP = 1e-6  # m: at the start, of shapes out of which no robot is lifted
 _THIN = 1e-3  # m: margin around other shapes that is left out
 _REBOUNDS = 0.5  # damping ratio of a soft contact below which it visibly rebounds
 _SLIDES, _SPINS, _ROLLS = 1, 4, 6  # dimensions of MuJoCo's contacts without friction, and with more than sticking
@@ -213,7 +212,7 @@ class _NearPair:
 
     def __post_init__(self) -> None:
         moving, partner = sorted(self.shapes, key=lambda shape: shape.body == WORLD)
-        of_face = moving.kind in _ON_FACES or (moving.kind == "box" and self.margin - self.start > _OVERLAP)
+        of_face = moving.kind in _ON_FACES or (moving.kind == "box" and self.margin - self.start > OVERLAP)
         if self.face and self.touches and partner.kind == "box" and of_face:
             partner = partner.face(*self.face)
         object.__setattr__(self, "shapes", (moving, partner))
@@ -268,7 +267,7 @@ class _NearPair:
         if self.softness[0] > 0 and self.softness[1] < _REBOUNDS:
             yield "a contact that rebounds by its softness"
         faces_down = self.on_plane and self.shapes[1].R[2, 2] <= 0
-        if self.margin - self.start > _OVERLAP and not (lifted and self.shapes[1].body == WORLD and not faces_down):
+        if self.margin - self.start > OVERLAP and not (lifted and self.shapes[1].body == WORLD and not faces_down):
             by = f"they overlap by {1e3 * (self.margin - self.start):.3g} mm at the start"
             yield f"{by}: begin elsewhere by [start], or exclude the pair in the file"
 

@@ -111,13 +111,17 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
 
 
 def _told(band: Band, comparison: Comparison, reference: Reference) -> Band:
-    """The band, for a comparison without a file without what a reference by steps does not tell to its tolerances."""
-    if comparison.budget is None or not reference.by_steps:
+    """The band; for a comparison without a file only what is determined, and told to its tolerances.
+
+    A truth whose error bar is larger than a tolerance leaves a row without judgement; a reference by steps does not.
+    """
+    if comparison.budget is None:
         return band
     told = {
         name: bound
         for name, bound in band.bounds.items()
-        if reference.tells(name, bound.absolute(reference.sizes.get(name, 1.0)))
+        if reference.determines(name)
+        and (not reference.by_steps or reference.tells(name, bound.absolute(reference.sizes.get(name, 1.0))))
     }
     return replace(band, bounds=told) if told else band
 

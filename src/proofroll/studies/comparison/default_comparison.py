@@ -1,7 +1,9 @@
 """Default comparison of a scene that has no comparison file."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -61,12 +63,14 @@ def default_comparison(
     if until is not None:
         time_grid(until, until or 1.0)  # raises for a time that makes no sense
         require_bounds("until", until, above=0)
-    usual = times_of(replace(file, duration=min(file.duration or _UNTIL, _FIRST) if until is None else until))
+    rows = asked_rows(scene, file, workers, engines, _CLOSE)
+    own_rows, own_unfit = ([], {}) if engines else _own_rows(name, scene, workers)
+    steps = [float(parse_engine(row.engine).options.get("dt", 0.0)) for row in own_rows]
+    duration = min(file.duration or _UNTIL, _FIRST) if until is None else until
+    usual = times_of(replace(file, duration=duration), max(steps, default=0.0))
     until, every = usual[0] if until is None else until, usual[1] if every is None else every
     time_grid(until, every)
     rest = f" (the first {until:g} s of {file.duration:g})" if file.duration and until < file.duration - every else ""
-    rows = asked_rows(scene, file, workers, engines, _CLOSE)
-    own_rows, own_unfit = ([], {}) if engines else _own_rows(name, scene, workers)
     if not rows:
         raise InputError("engine", None, "none is installed here that can be asked; pip install 'proofroll[all]'")
     described = {} if engines else describe_each(engine_names(), workers)
@@ -162,7 +166,7 @@ def own_engine(file: Path, scene: Scene, workers: Workers | None) -> tuple[OwnOp
     defaults = usual.settings if isinstance(usual, EngineFacts) else {}
     unusual = {key: value for key, value in taken.items() if key in preset or str(defaults.get(key, value)) != value}
     touches = own_options.of_contacts.keys() <= defaults.keys()
-    lacking = own_options.others_of_contacts if touches else own_options.others_alone
+    lacking = own_options.others_of_contacts if touches else []
     own_options = replace(own_options, others=[*lacking, *own_options.others])
     return own_options, str(EngineSpec(own_options.engine, unusual))
 
@@ -182,10 +186,17 @@ def _own_rows(name: str, scene: Scene, workers: Workers | None) -> tuple[list[Ro
     return [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE, short=f"{OWN_OPTIONS}{but}")], {}
 
 
-def times_of(file: SceneFile) -> tuple[float, float]:
-    """Last time and sampling interval of a first comparison of a scene [s]."""
-    duration = file.duration or _UNTIL
-    step = file.every or _STEP
+def times_of(file: SceneFile, own_step: float = 0.0) -> tuple[float, float]:
+    """Last time and sampling interval of a first comparison of a scene [s].
+
+    ``own_step``: one that the interval is a multiple of, if a tenth of the duration is long enough for that [s].
+    """
+    duration, step = file.duration or _UNTIL, file.every or _STEP
+    if own_step:
+        steps = [Fraction(length).limit_denominator(10**9) for length in (step, own_step)]
+        parts = math.lcm(*(length.denominator for length in steps))
+        common = math.lcm(*(int(length * parts) for length in steps)) / parts
+        step = common if common <= duration / 10 else step
     every = step * max(1, round(duration / _SAMPLES / step))
     return every * max(1, int(duration / every + 1e-9)), every
 

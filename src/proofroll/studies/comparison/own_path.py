@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,9 +27,9 @@ _JUDGED = {Verdict.AGREES, Verdict.DIFFERS, Verdict.CONVERGES, Verdict.UNCONFIRM
 
 
 def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
-    """Lines on what the options of a scene's own file do to the motion that is furthest off, and on the rest.
+    """Lines on what the options of a scene's own file do to the quantity that is furthest off, and on the rest.
 
-    Empty without a judged row of the file's options, and without contacts. Each line has one further option switched,
+    Empty without a judged row of the file's options, and without contacts where that row does not differ. Each line has one further option switched,
     the one that takes most of the error away, or adds least. It takes what the comparison's budget leaves.
 
     Args:
@@ -43,10 +44,10 @@ def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
     reference = outcome.points[point_name(run.parameters)].reference
     if reference is None:
         return []
-    if not own_options.of_contacts.keys() <= run.facts.settings.keys():
+    if not own_options.of_contacts.keys() <= run.facts.settings.keys() and run.verdict is not Verdict.DIFFERS:
         return []
-    left = dict(own_options.switches)
-    off = _off(reference, run.case, runner)
+    left = {words: made for words, made in own_options.switches.items() if made.keys() <= run.facts.settings.keys()}
+    off = _off(reference, run, runner)
     if off is None:
         return []
     quantity, error, bar = off
@@ -85,10 +86,15 @@ def _cases(run: Run, name: str, trials: dict[str, dict[str, str]], runner: Runne
     }
 
 
-def _off(reference: Reference, case: Case, runner: Runner) -> tuple[str, float, float] | None:
-    """Motion that is furthest off by its size, with its error and the reference's bar; None: all are within bars."""
+def _off(reference: Reference, run: Run, runner: Runner) -> tuple[str, float, float] | None:
+    """Quantity that is furthest off by its size, with its error and the reference's bar; None: all are within bars.
+
+    It is one that contradicts, or of a run that agrees a motion.
+    """
+    assert run.case is not None  # by the caller
     moves = [name for name, item in reference.scene.observables.items() if item.role is Role.MOTION and item.headline]
-    errors = _errors(reference, moves, case, runner)
+    wrong = [item.observable for item in run.judgements if item.verdict is Verdict.DIFFERS and math.isfinite(item.error)]
+    errors = _errors(reference, wrong or moves, run.case, runner)
     beyond = {name: error / (reference.scale(name) or 1.0) for name, (error, bar) in errors.items() if error > bar}
     if not beyond:
         return None

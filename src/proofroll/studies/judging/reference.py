@@ -142,6 +142,10 @@ class Reference:
             return False
         return self.true(name, self.curves[name]).error_bar <= tolerance
 
+    def determines(self, name: str) -> bool:
+        """False if the error bar of an observable is infinite, or the equations do not determine it all the time."""
+        return bool(np.isfinite(self._known(name, self.curves.get(name, np.zeros(0)))[1]))
+
     def bar_until(self, name: str, time: float) -> float:
         """Error bar of a variable up to a time [s], in its unit."""
         return bar_until(self.dataset.variables[name].attrs, time)

@@ -52,11 +52,11 @@ def test_softness_is_what_is_off(
         patch.setattr("proofroll.studies.comparison.own_path._SECONDS", 0.0)
         out = " ".join(proofroll("compare", str(robot[0]), *words)[1].split())
     assert "(0 runs): rest: " in out
-    assert "; not tried: hard contacts in place of soft ones; " in out
+    assert "; not tried: hard constraints in place of soft ones; " in out
     code, out, _ = proofroll("compare", str(robot[0]), *words)
     assert code == 0
     text = " ".join(out.split())
     assert "its steps are the reference, which is no judge of itself" in text
     lines = text.partition("Options of the file, switched one after the other; worst error of ")[2]
-    assert "hard contacts in place of soft ones: " in lines.partition("rest: ")[0]
+    assert "hard constraints in place of soft ones: " in lines.partition("rest: ")[0]
     assert "implicit" not in lines, "the file has none"

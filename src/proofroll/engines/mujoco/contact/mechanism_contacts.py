@@ -97,7 +97,6 @@ def _check_turning(contact: BodyContact) -> None:
 
 def write_contacts(spec: Any, bodies: dict[str, Any], mechanism: Mechanism, settings: MujocoSettings) -> None:
     """Adds geoms ``contact<k>a`` and ``contact<k>b`` and a pair for each contact k; no other geoms meet."""
-    settings.set_solver(spec.option)
     moving = _moving(mechanism)
     for number, (contact, shapes) in enumerate(zip(mechanism.contacts, shapes_at_start(mechanism), strict=True)):
         if contact.box_slot is not None and contact.slot:

@@ -74,6 +74,7 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     option = spec.option
     option.gravity = mechanism.gravity
     set_integration(option, settings)
+    settings.set_solver(option, contacts=bool(mechanism.contacts))
     # Without autoreset, a state that is not finite stays as it is instead of starting anew at time 0.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     if not mechanism.contacts:
