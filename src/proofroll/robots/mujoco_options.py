@@ -83,10 +83,10 @@ def own_options(path: Path) -> OwnOptions | None:
         settings={
             "integrator": integrator,
             "dt": f"{option.timestep:.12g}",
+            **({"eulerdamp": "False"} if explicit else {}),
             "solver": _SOLVERS[solver.upper()],
             "iterations": str(option.iterations),
             "noslip_iterations": str(option.noslip_iterations),
-            **({"eulerdamp": "False"} if explicit else {}),
         },
         of_contacts={"cone": _CONES[int(option.cone)], "impratio": str(float(option.impratio))},
         others=others,

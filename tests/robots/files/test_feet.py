@@ -435,7 +435,10 @@ def test_a_scene_moves_as_the_file_in_plain_mujoco(
     assert np.abs(ours["p_WB"].values[:, 0] - places).max() < bound
 
 
-@pytest.mark.parametrize(("lowest", "drop", "way"), [(-0.02, None, 0.03), (0.02, None, 0.0), (0.02, 0.01, -0.01)])
+@pytest.mark.parametrize(
+    ("lowest", "drop", "way"),
+    [(-0.02, None, 0.03), (-1e-13, None, 1e-13), (-5e-7, None, 5e-7), (0.02, None, 0.0), (0.02, 0.01, -0.01)],
+)
 def test_a_robot_is_lifted_out_of_its_floor_alone(lowest: float, drop: float | None, way: float) -> None:
-    """Above the floor it stays where it is, unless a height is asked for."""
+    """Above the floor it stays where it is, unless a height is asked for; digits of its file leave it on the floor."""
     assert lift(lowest, drop) == pytest.approx(way)

@@ -296,18 +296,14 @@ def test_the_armature_of_damping_is_the_implicit_step():
     assert runs[0].built().acceleration == pytest.approx(runs[2].built().acceleration, rel=1e-9)
 
 
-def test_the_armature_of_damping_needs_euler_and_joints():
-    """Other integrators are refused, for they damp by themselves, and so is the chart, which has no dampers."""
+def test_the_armature_of_damping_needs_euler():
+    """Other integrators are refused, for they damp by themselves."""
     for settings, said in (
         (preset("tuned", integrator="implicitfast", cone_correction=False), "needs integrator=Euler"),
-        (replace(MUJOCO.presets["chart"]["matched"], damping_armature=True), "chart does not use it"),
         (preset("default", integrator="implicitfast", eulerdamp=False), "implicitfast does not use it"),
     ):
         with pytest.raises(InputError, match=said):
-            MUJOCO.build(
-                damped_slider(1.0, 0.0) if settings.formulation == "geoms" else load_scene("sphere_in_cylinder"),
-                settings,
-            )
+            MUJOCO.build(damped_slider(1.0, 0.0), settings)
 
 
 @pytest.mark.drill

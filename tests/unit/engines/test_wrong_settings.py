@@ -6,6 +6,7 @@ import pytest
 
 from proofroll.core.errors import InputError, Missing
 from proofroll.core.plugins import engine_names, load_engine
+from proofroll.running.identity import resolve
 from proofroll.running.simulation import simulate
 
 # Scene -> engine -> options and pattern of the line.
@@ -21,6 +22,7 @@ WRONG = {
             ("formulation=geoms,preset=tuned,impedance=0.5", "impedance"),
             ("formulation=geoms,preset=tuned,impedance=0.4", "impedance"),
             ("curvature=true", "curvature"),
+            ("damping_armature=true", "damping_armature.*chart does not use it here; leave it out"),
             ("formulation=geoms,curvature=true,integrator=RK4", "integrator"),
             ("formulation=geoms,curvature=true,integrator=implicitfast", "integrator"),
             ("formulation=geoms,curvature=true,cone=pyramidal", "cone"),
@@ -103,6 +105,7 @@ WRONG = {
         "projection": [
             ("formulation=dependent,integrator=taylor", "projection: integrator"),
             ("formulation=dependent,singularity=stop", "projection: singularity"),
+            ("dt=1e-3", "projection: dt = '1e-3': dependent does not use it here; leave it out"),
         ],
     },
 }
@@ -122,6 +125,14 @@ def test_a_wrong_setting_gives_one_clear_line(scene: str, setting: str, words: s
     with pytest.raises(InputError, match=words) as caught:
         simulate(scene, setting, until=0.01, every=0.01)
     assert "\n" not in str(caught.value)
+
+
+def test_an_unused_setting_is_refused_before_a_case_is_planned() -> None:
+    """What is stored of a run has no setting without effect, so each is refused where settings are resolved."""
+    asked = {"mujoco": {"formulation": "joints", "impratio": 2.0}, "projection": {"dt": 1e-3}}
+    for engine, options in asked.items():
+        with pytest.raises(InputError, match="does not use it here; leave it out"):
+            resolve(engine, options)
 
 
 @pytest.mark.parametrize("name", engine_names())

@@ -74,7 +74,6 @@ class PinocchioSettings:
             advice = f"{self.formulation} has no contact solver; leave it out, or take formulation=impulses"
             yield is_set and not solves, name, advice
             yield solves and not is_set, name, f"{self.formulation} needs one; its presets have one"
-        yield self.convex and not solves, "convex", "only impulses has it; leave it out"
         yield solves and self.projection, "projection", "the solver corrects the contacts; leave it out"
         if integrators is not None:
             advice = "a mechanism always has its orientations; leave it out"

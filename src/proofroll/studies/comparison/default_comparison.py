@@ -159,16 +159,13 @@ def own_engine(file: Path, scene: Scene, workers: Workers | None) -> tuple[OwnOp
     if not formulations:
         raise InputError("--like", file, f"no formulation of {own_options.engine} represents {scene.name}")
     preset = {**parse_engine(formulations[0]).options, "preset": "default"}
-    without_contacts = {**preset, **own_options.settings}
-    choices = [preset, without_contacts, {**without_contacts, **own_options.of_contacts}]
-    usual, _, with_contacts = resolve([(own_options.engine, options) for options in choices], workers)
-    taken = choices[1 if isinstance(with_contacts, InputError) else 2]
+    (usual,) = resolve([(own_options.engine, preset)], workers)
     defaults = usual.settings if isinstance(usual, EngineFacts) else {}
-    unusual = {key: value for key, value in taken.items() if key in preset or str(defaults.get(key, value)) != value}
     touches = own_options.of_contacts.keys() <= defaults.keys()
-    lacking = own_options.others_of_contacts if touches else []
-    own_options = replace(own_options, others=[*lacking, *own_options.others])
-    return own_options, str(EngineSpec(own_options.engine, unusual))
+    taken = {**preset, **own_options.settings, **(own_options.of_contacts if touches else {})}
+    unusual = {key: value for key, value in taken.items() if key in preset or str(defaults.get(key, value)) != value}
+    others = [*(own_options.others_of_contacts if touches else []), *own_options.others]
+    return replace(own_options, others=others), str(EngineSpec(own_options.engine, unusual))
 
 
 def _own_rows(name: str, scene: Scene, workers: Workers | None) -> tuple[list[Row], dict[str, str]]:
@@ -187,10 +184,7 @@ def _own_rows(name: str, scene: Scene, workers: Workers | None) -> tuple[list[Ro
 
 
 def times_of(file: SceneFile, own_step: float = 0.0) -> tuple[float, float]:
-    """Last time and sampling interval of a first comparison of a scene [s].
-
-    ``own_step``: one that the interval is a multiple of, if a tenth of the duration is long enough for that [s].
-    """
+    """Last time and sampling interval of a first comparison of a scene [s], at steps of ``own_step`` if ten fit."""
     duration, step = file.duration or _UNTIL, file.every or _STEP
     if own_step:
         steps = [Fraction(length).limit_denominator(10**9) for length in (step, own_step)]

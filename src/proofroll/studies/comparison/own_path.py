@@ -29,8 +29,9 @@ _JUDGED = {Verdict.AGREES, Verdict.DIFFERS, Verdict.CONVERGES, Verdict.UNCONFIRM
 def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
     """Lines on what the options of a scene's own file do to the quantity that is furthest off, and on the rest.
 
-    Empty without a judged row of the file's options, and without contacts where that row does not differ. Each line has one further option switched,
-    the one that takes most of the error away, or adds least. It takes what the comparison's budget leaves.
+    Empty without a judged row of the file's options, and without contacts where that row does not differ. Each line has
+    one further option switched, the one that takes most of the error away, or adds least. It takes what the
+    comparison's budget leaves.
 
     Args:
         outcome: of the comparison.
@@ -93,7 +94,9 @@ def _off(reference: Reference, run: Run, runner: Runner) -> tuple[str, float, fl
     """
     assert run.case is not None  # by the caller
     moves = [name for name, item in reference.scene.observables.items() if item.role is Role.MOTION and item.headline]
-    wrong = [item.observable for item in run.judgements if item.verdict is Verdict.DIFFERS and math.isfinite(item.error)]
+    wrong = [
+        item.observable for item in run.judgements if item.verdict is Verdict.DIFFERS and math.isfinite(item.error)
+    ]
     errors = _errors(reference, wrong or moves, run.case, runner)
     beyond = {name: error / (reference.scale(name) or 1.0) for name, (error, bar) in errors.items() if error > bar}
     if not beyond:

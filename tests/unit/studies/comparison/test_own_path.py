@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -60,3 +61,18 @@ def test_softness_is_what_is_off(
     lines = text.partition("Options of the file, switched one after the other; worst error of ")[2]
     assert "hard constraints in place of soft ones: " in lines.partition("rest: ")[0]
     assert "implicit" not in lines, "the file has none"
+
+
+@pytest.mark.nightly
+def test_soft_friction_is_what_is_off(proofroll: Proofroll, tmp_path: Path) -> None:
+    """The friction of a joint that the file's softness makes wrong is right with hard constraints; a line says so."""
+    path = tmp_path / "wheel.xml"
+    joint = '<joint name="axle" axis="0 0 1" damping="0.05" frictionloss="0.1"/>'
+    key = '<keyframe><key name="spin" qvel="10"/></keyframe>'
+    wheel = f'<body name="wheel">{joint}<geom type="cylinder" size="0.1 0.05" mass="1"/></body>'
+    path.write_text(f"<mujoco><option noslip_iterations='10'/><worldbody>{wheel}</worldbody>{key}</mujoco>")
+    code, out, _ = proofroll("compare", str(path), "--set", "keyframe=1", "--out", str(tmp_path / "out"))
+    assert code == 0
+    text = " ".join(out.split())
+    lines = text.partition("Options of the file, switched one after the other; worst error of friction.axle ")[2]
+    assert re.search(r"hard constraints in place of soft ones: [\d.e-]+ → [\d.]+e-1\d N m", lines)

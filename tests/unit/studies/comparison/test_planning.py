@@ -6,11 +6,14 @@ import dataclasses
 
 import pytest
 
+from proofroll import compare
 from proofroll.core.comparison import Edge, Row
 from proofroll.core.errors import InputError
 from proofroll.core.observable import Role
+from proofroll.core.verdict import Verdict
 from proofroll.files.comparison_file import load_comparison
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.report.comparison.summary import outcome_content
 from proofroll.studies.comparison import default_comparison as first_look
 from proofroll.studies.comparison import planning
 from proofroll.studies.comparison.default_comparison import able
@@ -95,6 +98,24 @@ def test_a_comparison_without_motion_is_refused() -> None:
     """An end at the start, where every engine is right, is one line."""
     with pytest.raises(InputError, match=r"until = 0\.0: the value must be above 0"):
         first_look.default_comparison("pendulum", {}, until=0.0)
+
+
+@pytest.mark.parametrize(
+    ("own_step", "duration", "interval"), [(0.0, 0.3, 0.008), (2e-3, 0.3, 0.008), (5e-3, 0.3, 0.02), (7e-3, 0.2, 0.004)]
+)
+def test_the_step_of_a_file_divides_the_interval(own_step: float, duration: float, interval: float) -> None:
+    """A first look samples at steps of the file's own row, where at least ten samples are left."""
+    file = dataclasses.replace(read_scene_file("pendulum"), duration=duration, every=None)
+    assert first_look.times_of(file, own_step)[1] == pytest.approx(interval, rel=1e-12)
+
+
+def test_what_is_not_determined_is_not_asked() -> None:
+    """A first look at a box at rest judges its motion, and says that its corners share their forces in no known way."""
+    outcome = compare("pushed_box", engines=["pinocchio"], until=0.05)
+    (run,) = (run for run in outcome.runs if not run.facts.witness)
+    assert run.verdict is Verdict.AGREES
+    assert not any(item.observable == "contact_forces" for item in run.judgements)
+    assert "Not determined by the equations, and so not judged: contact_forces." in outcome_content(outcome).truth_ends
 
 
 @pytest.mark.drill
