@@ -111,7 +111,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
 
 
 def _told(band: Band, comparison: Comparison, reference: Reference) -> Band:
-    """The band; for a comparison without a file only what is determined, and told to its tolerances.
+    """The band; for a comparison without a file only what is determined, within its tolerances.
 
     A truth whose error bar is larger than a tolerance leaves a row without judgement; a reference by steps does not.
     """

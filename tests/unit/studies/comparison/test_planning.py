@@ -109,6 +109,7 @@ def test_the_step_of_a_file_divides_the_interval(own_step: float, duration: floa
     assert first_look.times_of(file, own_step)[1] == pytest.approx(interval, rel=1e-12)
 
 
+@pytest.mark.drill
 def test_what_is_not_determined_is_not_asked() -> None:
     """A first look at a box at rest judges its motion, and says that its corners share their forces in no known way."""
     outcome = compare("pushed_box", engines=["pinocchio"], until=0.05)
