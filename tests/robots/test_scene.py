@@ -249,9 +249,9 @@ def test_what_a_file_has_beyond_the_answer_is_said(robot):
     """Ranges, actuators, laws and couplings that a scene leaves out are named, each with what brings it in."""
     body = '<body gravcomp="1"><joint name="j" damping="1"/><geom size="0.1"/></body>'
     path = robot("arm.xml", f'<mujoco><worldbody>{body}</worldbody><actuator><motor joint="j"/></actuator></mujoco>')
-    compensated = "gravity compensation of 1 body"
-    assert load_scene(path).omitted == ("1 actuator (actuators=1)", compensated, "contacts")
-    assert load_scene(path, actuators=1).omitted == (compensated, "contacts")
+    assert load_scene(path).omitted == ("1 actuator (actuators=1)", "contacts")
+    compensated = "gravity compensation of 1 body (gravcomp=1)"
+    assert load_scene(path, actuators=1, gravcomp=0).omitted == (compensated, "contacts")
     arm = robot("arm.urdf", urdf(first='<dynamics damping="0.3"/>'))
     assert load_scene(arm).omitted == ("2 joint ranges (limits=1)", "contacts")
     assert load_scene(arm, limits=1, damping=0).omitted == ("damping of joints (damping=1)", "contacts")
@@ -333,6 +333,31 @@ def test_a_keyframe_is_a_start(tmp_path: Path, key: str) -> None:
             assert at_body.p_WB.to_numpy() == pytest.approx(data.body(body).xpos, abs=1e-12)
             assert at_body.w_WB.to_numpy() == pytest.approx(velocity[:3], abs=1e-12)
             assert at_body.v_WB.to_numpy() == pytest.approx(velocity[3:], abs=1e-12)
+
+
+@pytest.mark.drill
+def test_compensated_bodies_move_as_in_mujoco(tmp_path: Path) -> None:
+    """A force at the centre of mass of each body, also of one that is fixed to another, is MuJoCo's compensation."""
+    mujoco = pytest.importorskip("mujoco")
+    path = tmp_path / "arm.xml"
+    tool = '<body name="tool" gravcomp="0.3" pos="0 0 0.4"><geom type="box" size="0.1 0.02 0.03" pos="0.1 0 0"/></body>'
+    path.write_text(
+        '<mujoco><option gravity="1 -2 -9"/><worldbody><body name="upper" gravcomp="1"><joint axis="0 1 0"/>'
+        '<geom type="capsule" fromto="0 0 0 0.1 0 0.3" size="0.05"/><body name="lower" pos="0.1 0 0.3" gravcomp="0.5">'
+        f'<joint axis="1 0 0"/><geom type="capsule" fromto="0 0 0 0 0.2 0.3" size="0.03"/>{tool}</body></body>'
+        "</worldbody></mujoco>"
+    )
+    scene = load_scene(str(path), seed=2)
+    mechanism = scene.elements[0].mechanism
+    solution = JointCoordinates(mechanism).solve(*mechanism.start())
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = ([getattr(joint, key)[0] for joint in mechanism.joints] for key in ("q0", "v0"))
+    mujoco.mj_forward(model, data)
+    assert solution.acceleration == pytest.approx(data.qacc, rel=1e-12)
+    ends = [simulate(scene, engine, until=0.1, every=0.1)["p_WB"] for engine in ("mujoco", "exudyn", "pinocchio")]
+    for end in ends[1:]:
+        assert end.to_numpy() == pytest.approx(ends[0].to_numpy(), abs=1e-7)
 
 
 def _under_control(robot: Path, text: str) -> Scene:

@@ -33,12 +33,14 @@ class RobotBody:
         mass: [kg].
         com: centre of mass in the body's frame [m], shape (3,).
         inertia: about the centre of mass, in the body's axes [kg m²], shape (3, 3).
+        compensation: part of its weight that a force at the centre of mass carries [1].
     """
 
     name: str
     mass: float
     com: Array
     inertia: Array
+    compensation: float = 0.0
 
     @property
     def moments(self) -> Array:
@@ -263,6 +265,11 @@ class Robot:
                 turned = R @ joint.rotation
                 welded[joint.child] = (home, p + R @ joint.position - turned @ joint.child_position, turned)
         return welded
+
+    def carried(self, body: str) -> tuple[str, Array, Array]:
+        """Child of the joint that carries a body, or :data:`NO_BODY`; position and rotation in the frame of that."""
+        home, p, R = self.welded[body]
+        return next((joint.child for joint in self.moving if joint.name == home), NO_BODY), p, R
 
     @cached_property
     def groups(self) -> dict[str, RobotBody]:

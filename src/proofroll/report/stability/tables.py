@@ -17,10 +17,6 @@ from proofroll.studies.stability.records import BoundaryPoint, ExplainedBoundary
 _BEYOND = 1e6
 
 
-def _off(error: float) -> str:
-    return "more than a million times" if error > _BEYOND else f"{number(100 * error, 3)} % of"
-
-
 def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
     """Parts of a map stored in ``path``: boundaries, the worst silent cases, conclusions, what is missing."""
     yield from (headline(study), "", boundary_table(study), "")
@@ -135,7 +131,8 @@ def silent_lines(study: StabilityStudy) -> Iterator[str]:
             continue
         seen.add((point.curve, point.axis))
         side = point.shown
-        wrong = "" if side.error is None else f", off by {_off(side.error)} the range"
+        wrong = "" if side.error is None else f", off by {number(100 * side.error, 3)} % of the range"
+        wrong = wrong if (side.error or 0.0) <= _BEYOND else ", off by more than a million times the range"
         finest = step(point.resolution, point.finest)
         if side.largest is not None:
             beyond = f"just beyond {step(point.resolution, side.largest)}"

@@ -97,8 +97,7 @@ class StandingRobot:
 
     def place(self, link: str) -> tuple[str, Array, Array]:
         """Body of the scene that carries a link, with the place [m] and axes of the link in it."""
-        home, p, R = self.robot.welded[link]
-        carrier = next((joint.child for joint in self.robot.moving if joint.name == home), NO_BODY)
+        carrier, p, R = self.robot.carried(link)
         return (self.bodies[carrier] if carrier != NO_BODY else WORLD), p, R
 
 

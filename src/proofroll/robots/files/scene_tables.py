@@ -19,7 +19,6 @@ from proofroll.core.number_format import counted
 from proofroll.elements.mechanism.scene.joint_kinds import DISTANCE, FACTS, LAWS, ONE_COORDINATE, JointKind
 from proofroll.elements.mechanism.scene.rotations import from_quaternion, to_quaternion, to_rpy
 from proofroll.robots.files.meaning import opened, robot_of_text
-from proofroll.robots.files.mjcf.parse import COMPENSATION
 from proofroll.robots.files.robot_file import Keyframe, RobotFile
 from proofroll.robots.files.urdf import extra_dynamics
 from proofroll.robots.model import NO_BODY, Array, Cord, Mimic, Robot, RobotActuator, RobotJoint, RobotLoop, Tie
@@ -59,6 +58,8 @@ def laws(robot: Robot) -> dict[str, ParameterRow]:
             parameters[law] = (1.0, "1", words, {"at_least": 0})
     if any(joint.lower is not None or joint.upper is not None for joint in robot.moving):
         parameters["limits"] = (0, "1", "whether the joints have their stops (1) or turn through them (0)", SWITCH)
+    if any(body.compensation for body in robot.bodies.values()):
+        parameters["gravcomp"] = (1, "1", "whether the compensation of gravity of bodies acts (1) or not (0)", SWITCH)
     parameters["couplings"] = (1, "1", "whether couplings of joints outside the tree are asked for", SWITCH)
     if any(body.impossible for body in robot.bodies.values()):
         words = "whether each link must be physically possible (1), or only all that a joint moves together (0)"
@@ -84,6 +85,7 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
     with_couplings = bool(values["couplings"])
     following = _following(robot) if with_couplings else frozenset()
     gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])
+    up = -gravity / np.linalg.norm(gravity)
     bodies = [(names[joint.child], robot.groups[joint.name]) for joint in robot.moving]
     carriers = {robot.welded[joint.parent][0] for joint in robot.moving}
     return {
@@ -103,6 +105,7 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
             if joint.name not in carriers
         ],
         "couplings": list(_coupled(robot)) if with_couplings else [],
+        "forces": list(_compensations(robot, names, values["gravity"] * up)) if values.get("gravcomp") else [],
         "unmodelled": [
             *(f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if with_couplings),
             *(
@@ -121,6 +124,16 @@ def tables_of(file: RobotFile, robot: Robot, start: RobotStates, values: Mapping
     }
 
 
+def _compensations(robot: Robot, names: Mapping[str, str], up: Array) -> Iterator[dict[str, Any]]:
+    """Tables of the forces that carry bodies; ``up``: acceleration against gravity [m/s²], shape (3,)."""
+    for link, body in robot.bodies.items():
+        carrier, p, R = robot.carried(link)
+        if body.compensation and carrier != NO_BODY:
+            row = {"name": f"gravcomp {link}", "body": names[carrier], "kind": "force"}
+            force = body.compensation * body.mass * up
+            yield row | {"position": (p + R @ body.com).tolist(), "value": force.tolist()}
+
+
 def _omitted(file: RobotFile, robot: Robot, values: Mapping[str, float]) -> Iterator[str]:
     """Clauses on what a robot file describes and its scene leaves out, each with the parameter that brings it in."""
     ranges = sum(joint.lower is not None or joint.upper is not None for joint in robot.moving)
@@ -137,9 +150,9 @@ def _omitted(file: RobotFile, robot: Robot, values: Mapping[str, float]) -> Iter
     coupled += sum(1 for _ in _couplings(file, robot.change(mimics=(), ties=())))
     if coupled and not values["couplings"]:
         yield f"{counted(coupled, 'couplings')} (couplings=1)"
-    compensated = sum(remark.what == COMPENSATION for remark in file.remarks)
-    if compensated:
-        yield f"gravity compensation of {counted(compensated, 'bodies')}"
+    if values.get("gravcomp") == 0:
+        compensated = sum(bool(body.compensation) for body in robot.bodies.values())
+        yield f"gravity compensation of {counted(compensated, 'bodies')} (gravcomp=1)"
     extra = Counter(key for joint in file.root.iter("joint") for key in extra_dynamics(joint))
     yield from (f"{key} of {counted(number, 'joints')}" for key, number in extra.items())
     yield CONTACTS
@@ -316,9 +329,8 @@ def _loop(robot: Robot, loop: RobotLoop | Cord, names: Mapping[str, str]) -> dic
     table |= {"kind": loop.kind} if isinstance(loop, RobotLoop) else {"kind": DISTANCE, "at_most": loop.at_most}
     turns = {}
     for side, link, position in (("a", loop.body_a, loop.position_a), ("b", loop.body_b, loop.position_b)):
-        home, p, R = robot.welded[link]
-        carrier = next((joint.child for joint in robot.moving if joint.name == home), NO_BODY)
-        table |= {f"body_{side}": "world" if home == NO_BODY else names[carrier]}
+        carrier, p, R = robot.carried(link)
+        table |= {f"body_{side}": "world" if carrier == NO_BODY else names[carrier]}
         table |= {f"position_{side}": (p + R @ position).tolist()}
         turns[side] = R
     if isinstance(loop, RobotLoop) and loop.kind == JointKind.FIXED:

@@ -293,7 +293,8 @@ def body_of(model: Any, index: int, name: str) -> RobotBody:
     """One of MuJoCo's bodies, in its own frame."""
     A = matrix(model.body_iquat[index])
     inertia = A @ np.diag(model.body_inertia[index]) @ A.T
-    return RobotBody(name, float(model.body_mass[index]), np.array(model.body_ipos[index]), inertia)
+    com, mass = np.array(model.body_ipos[index]), float(model.body_mass[index])
+    return RobotBody(name, mass, com, inertia, compensation=float(model.body_gravcomp[index]))
 
 
 def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:

@@ -124,7 +124,9 @@ class Plan:
         """
         engines = [run for run in self.runs if not run.witness]
         witnesses = [run for run in self.runs if run.witness]
-        parts = [part for runs in (engines, witnesses) for part in (_runs(runs), _further_steps(runs))]
+        parts: list[list[Case]] = []
+        for runs in (engines, witnesses):
+            parts += [[run.ladder[1] for run in runs if 1 in run.ladder], _further_steps(runs)]
         return [[*self.truths.values()], *parts]
 
     @property
@@ -170,10 +172,6 @@ class Plan:
             truths=truths,
             runs=[run for run in self.runs if point_name(run.parameters) in names],
         )
-
-
-def _runs(runs: Sequence[Planned]) -> list[Case]:
-    return [case for run in runs for factor, case in run.ladder.items() if factor == 1]
 
 
 def _further_steps(runs: Sequence[Planned]) -> list[Case]:

@@ -259,7 +259,7 @@ def _other_starts(mechanism: Mechanism) -> Iterator[tuple[str, Mechanism]]:
     if any(np.any(joint.v0) for joint in mechanism.joints):
         says = "the start was not taken: it begins at rest, without the velocities of the scene"
         yield says, replace(mechanism, joints=resting)
-    if mechanism.loops or mechanism.couplings or not any(map(_away, mechanism.joints)):
+    if mechanism.loops or mechanism.couplings or all(tuple(joint.q0) == _home(joint) for joint in mechanism.joints):
         return
     try:
         home = tuple(replace(joint, q0=_home(joint)) for joint in mechanism.joints)
@@ -274,10 +274,6 @@ def _home(joint: Joint) -> tuple[float, ...]:
     """Coordinates of a joint at zero, with the quaternion of no turn."""
     turns = (1.0, 0.0, 0.0, 0.0) if joint.kind in WITH_QUATERNION else ()
     return (0.0,) * (joint.nq - len(turns)) + turns
-
-
-def _away(joint: Joint) -> bool:
-    return tuple(joint.q0) != _home(joint)
 
 
 # Cached: every run of a comparison that differs asks for the same few motions.

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.arrays import cross
-from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.scene.bushing import Bushing
 from proofroll.elements.mechanism.scene.rotations import Array
 
@@ -42,12 +42,22 @@ class AppliedLoads:
         ]
         native = {bushing.name for bushing in balls.values()}
         self._bushings = [(b, index[b.body_a], index[b.body_b]) for b in mechanism.bushings if b.name not in native]
-        self._forces = [(force, index[force.body], index[force.reaction]) for force in mechanism.forces]
-        self.any = bool(self._springs or self._bushings or self._forces)
+        coms, self._still, self._forces = (
+            {body.name: body.com for body in mechanism.bodies},
+            np.zeros((model.nbody, 6)),
+            [],
+        )
+        for force in mechanism.forces:  # those that no pose and no time changes are added up once
+            central = force.kind == "force" and force.reaction == WORLD and force.position == coms[force.body]
+            if central and force.frame == "world" and all(isinstance(part, float) for part in force.value):
+                self._still[index[force.body], :3] += force.value
+            else:
+                self._forces.append((force, index[force.body], index[force.reaction]))
+        self.any = bool(self._springs or self._bushings or mechanism.forces)
 
     def apply(self, data: Any) -> None:
         """Sets the loads for the time, poses and velocities of ``data``."""
-        data.xfrc_applied[:] = 0.0
+        data.xfrc_applied[:] = self._still
         for spring, law, a, b in self._springs:
             (place_a, velocity_a, _), (place_b, velocity_b, _) = (
                 self._point(data, *end) for end in ((a, spring.position_a), (b, spring.position_b))

@@ -47,10 +47,6 @@ def _length(name: str, components: int = 3) -> Callable[[RollingBall, xr.Dataset
     return lambda _, dataset: np.asarray(np.linalg.norm(dataset[name].to_numpy()[:, :components], axis=1))
 
 
-def _slip(_: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    return np.asarray(np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy()))
-
-
 _DERIVED = {
     "x": Derived("m", _component("p_WB", 0)),
     "y": Derived("m", _component("p_WB", 1)),
@@ -60,7 +56,7 @@ _DERIVED = {
     "vertical_speed": Derived("m/s", _component("v_WB", 2)),
     "speed": Derived("m/s", _length("v_WB")),
     "angular_speed": Derived("rad/s", _length("w_WB")),
-    "slip": Derived("m/s", _slip),
+    "slip": Derived("m/s", lambda _, dataset: np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy())),
 }
 
 

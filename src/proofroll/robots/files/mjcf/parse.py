@@ -36,7 +36,6 @@ _UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
 _PLACES = {"name", "joint", "jointinparent", "tendon", "site", "refsite", "slidersite", "cranksite", "body"}
 # Of a remark on a shape that collides in the file, and that no copy has.
 NO_SHAPE = "it collides in the file, and no copy has it"
-COMPENSATION = "its gravity compensation is left out, as actuators are; all engines read it without"
 # Macros, which the engine that defines the format writes out.
 _MACROS = {"replicate", "attach", "composite"}
 
@@ -182,7 +181,7 @@ def _add(
         parent.attrib.pop("material", None)
     remove_height_fields(root, shapes)
     solid = _solid(root, shapes) if contacts else set[Element]()
-    remarks = [*remove_meshes(root, shapes, file.parent, inside, solid), *_gravity_compensations(root)]
+    remarks = list(remove_meshes(root, shapes, file.parent, inside, solid))
     remarks += _lost_shapes(root, shapes, solid) if contacts else []
     parts[f"{len(parts)}.xml"] = root
     for model in root.iter("model"):
@@ -274,13 +273,6 @@ def _lost_shapes(root: Element, shapes: Sequence[Classed], solid: set[Element]) 
         if shape.element in solid:
             kind = "mesh" if shape.given.get("mesh") else "height field"
             yield LintRemark("note", f"{kind} of {shape.body.get('name', 'the world')}", NO_SHAPE)
-
-
-def _gravity_compensations(root: Element) -> Iterator[LintRemark]:
-    """Removes compensation of gravity from bodies; yields a remark for each."""
-    for body in root.iter("body"):
-        if body.attrib.pop("gravcomp", "0") not in {"0", "0.0"}:
-            yield LintRemark("note", f"body {body.get('name', '')}", COMPENSATION)
 
 
 def name_all(root: Element) -> None:
