@@ -271,6 +271,8 @@ def robot_of(model: Any) -> Robot:
     gravity = np.zeros(3) if is_off(model, "GRAVITY") else np.array(model.opt.gravity)
     loops, ties, further = _constraints(model, names)
     cords, laws_of_tendons = _tendons(model, names)
+    carrying = np.flatnonzero(model.jnt_actgravcomp & model.jnt_actfrclimited & model.body_gravcomp.any())
+    within = [f"gravity compensation within the actuatorfrcrange of {model.joint(k).name}" for k in carrying.tolist()]
     robot = Robot(
         name="robot",
         bodies=bodies,
@@ -281,7 +283,7 @@ def robot_of(model: Any) -> Robot:
         loops=loops,
         ties=ties,
         cords=cords,
-        further=(*further, *laws_of_tendons),
+        further=(*further, *laws_of_tendons, *within),
         actuators=actuators,
     )
     laws = {"SPRING": "stiffness", "DAMPER": "damping", "FRICTIONLOSS": "friction"}
