@@ -288,7 +288,10 @@ def step_sentence(made: StepAnswer) -> str:
         faster = f", {number(ratio)} times faster" if ratio > _FASTER else ""
         return f"{told}; {step(item.resolution, item.step)} would do{faster}."
     double = "twice the step" if made.resolution == "dt" else "ten times the tolerance"
-    return f"{told}; {double} does not do."
+    fault = "was not run" if item.coarser is None else "does not do"
+    if item.coarser is not None and (item.coarser.holds or item.coarser.status == Status.TIMEOUT):
+        fault = "is within it, but not confirmed" if item.coarser.holds else "takes too long"
+    return f"{told}; {double} {fault}."
 
 
 def _would_do(made: StepAnswer) -> str:

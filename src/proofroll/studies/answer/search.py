@@ -21,7 +21,7 @@ from proofroll.studies.judging.reference import Reference
 from proofroll.studies.swept_settings import Curve, curves_of
 
 # Wall time of a run over its cap of processor time, and least limit of a run that should be cheap [s].
-_LIMIT, _LEAST_LIMIT = 1.6, 2.0
+_LIMIT, _LEAST_LIMIT = 1.6, 6.0
 # Doublings of a preset's own step with which a search begins: a bound from a quarter of the steps may be enough.
 _COARSER = 2
 # A coarser step may take this many times as long as the one that holds.

@@ -405,7 +405,8 @@ class SettingSearch:
         if good - 1 not in self.levels or self._sound(divisor // 2):
             return None, ""
         if good < 2:
-            return None, f"twice dt {number(self.step(divisor), 3)} s breaks down"
+            fault = "takes too long" if self.runs[divisor // 2].status is Status.TIMEOUT else "breaks down"
+            return None, f"twice dt {number(self.step(divisor), 3)} s {fault}"
         third = 3 * divisor // 4
         if third not in self.runs:
             return third, ""

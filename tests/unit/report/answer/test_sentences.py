@@ -111,6 +111,13 @@ def test_a_persons_step_is_good_enough_or_not() -> None:
     assert step_sentence(OWN) == (
         "Yes: 0.12 mm of 1 mm over 5 s (dt 2e-3 s, 160× real time); twice the step does not do."
     )
+    for tried, words in (
+        (replace(COARSER, of_allowed=0.5), "is within it, but not confirmed"),
+        (replace(COARSER, status="timeout", of_allowed=None), "takes too long"),
+        (None, "was not run"),
+    ):
+        unsure = replace(OWN, advised=replace(OWN.advised, coarser=tried))
+        assert step_sentence(unsure).endswith(f"; twice the step {words}.")
     coarser = replace(OWN, advised=replace(HELD, step=8e-3, seconds_per_second=1 / 640))
     assert step_sentence(coarser).endswith("; dt 8e-3 s would do, 4 times faster.")
     no_faster = replace(OWN, advised=replace(HELD, step=8e-3, seconds_per_second=1 / 170))
