@@ -94,7 +94,9 @@ def event_columns(events: Sequence[Event]) -> dict[str, Variable]:
         "event_name": ("to what", [event.name for event in events]),
     }
     return {
-        name: Variable(("event",), _texts(values), {"units": "1", "long_name": meaning})
+        name: Variable(
+            ("event",), np.array(values, dtype=str if values else "<U1"), {"units": "1", "long_name": meaning}
+        )
         for name, (meaning, values) in texts.items()
     } | {
         name: Variable(("event",), np.array(values, dtype=np.float64), {"units": "s", "long_name": meaning})
@@ -116,7 +118,3 @@ def events_of(dataset: xr.Dataset | Columns) -> list[Event]:
     named = "event_name" in dataset  # files of earlier runs have none
     names = variables["event_name"].values.tolist() if named else [""] * len(columns[0])
     return [Event(*row) for row in zip(*columns, names, strict=True)]
-
-
-def _texts(values: Sequence[str]) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
-    return np.array(values, dtype=str) if values else np.zeros(0, dtype="<U1")

@@ -299,7 +299,10 @@ def _unlike(robot: Robot, rival: Robot) -> Iterator[UnlikeValue]:
     """Values of joints that differ between the two files."""
     theirs = {joint.name: joint for joint in rival.moving}
     groups = robot.groups, rival.groups
-    follows = [{mimic.joint: _written(mimic) for mimic in side.mimics} for side in (robot, rival)]
+    follows = [
+        {mimic.joint: f"{mimic.multiplier:g} · {mimic.other} + {mimic.offset:g}" for mimic in side.mimics}
+        for side in (robot, rival)
+    ]
     for joint in robot.moving:
         if joint.name not in theirs:
             continue
@@ -311,10 +314,6 @@ def _unlike(robot: Robot, rival: Robot) -> Iterator[UnlikeValue]:
         for quantity, (value, rival_value) in pairs.items():
             if _apart(value, rival_value):
                 yield UnlikeValue(joint.name, quantity, value, rival_value)
-
-
-def _written(mimic: Mimic) -> str:
-    return f"{mimic.multiplier:g} · {mimic.other} + {mimic.offset:g}"
 
 
 def _apart(value: Any, rival_value: Any) -> bool:

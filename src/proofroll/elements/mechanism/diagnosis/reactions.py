@@ -144,7 +144,7 @@ def reactions(evidence: Evidence) -> Iterator[Cause]:
     run, truth = (data.isel(time=slice(1, None)) for data in pair)
     names = [connection.name for connection in evidence.element.mechanism.connections]
     reported, true = ({kind: _stacked(data, kind, names) for kind, _, _ in _KINDS} for data in (run, truth))
-    bars = {kind: _bar(truth, f"{kind}s") for kind, _, _ in _KINDS}
+    bars = {kind: float(truth[f"{kind}s"].attrs.get("error_bar", 0.0)) for kind, _, _ in _KINDS if f"{kind}s" in truth}
     for connection in _reactions(evidence, placed_of(evidence.element.mechanism, truth), reported, true, bars):
         causes = [cause for cause in connection.causes(evidence.step) if cause.proven]
         if causes and not (
@@ -200,7 +200,3 @@ def _stacked(data: Any, kind: str, names: list[str]) -> FloatArray:
         for name in names
     ]
     return np.moveaxis(np.array(rows, dtype=np.float64), -1, 0)
-
-
-def _bar(truth: Any, name: str) -> float:
-    return float(truth[name].attrs.get("error_bar", 0.0)) if name in truth else 0.0

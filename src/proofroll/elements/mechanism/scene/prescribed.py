@@ -25,10 +25,6 @@ class Moved(NamedTuple):
     acceleration: Any
 
 
-def _of_sqrt(x: Any, y: Any, _: Any) -> tuple[Any, Any]:
-    return 0.5 / y, -0.25 / (y * x)
-
-
 def _of_tan(_: Any, y: Any, __: Any) -> tuple[Any, Any]:
     slope = 1.0 + y * y
     return slope, 2.0 * y * slope
@@ -58,7 +54,7 @@ _DERIVATIVES: Mapping[str, Callable[[Any, Any, Mapping[str, Callable[[Any], Any]
     "atan": _of_atan,
     "exp": lambda _, y, __: (y, y),
     "log": lambda x, _, __: (1.0 / x, -1.0 / (x * x)),
-    "sqrt": _of_sqrt,
+    "sqrt": lambda x, y, _: (0.5 / y, -0.25 / (y * x)),
     "tanh": _of_tanh,
 }
 

@@ -68,18 +68,14 @@ def classed(root: Element, tag: str) -> Iterator[Classed]:
             else:
                 yield from below(child, child if child.tag == "body" else body, inherited)
 
+    main = next((default.get("class", _MAIN) for default in root.findall("default")), _MAIN)
     for world in root.findall("worldbody"):
-        yield from below(world, world, _main(root))
+        yield from below(world, world, main)
 
 
 def with_classes(root: Element, tag: str) -> Iterator[tuple[Element, dict[str, str]]]:
     """All elements of a tag below <worldbody>, with their attributes, own and inherited from the class."""
     return ((item.element, item.given) for item in classed(root, tag))
-
-
-def _main(root: Element) -> str:
-    """Name of the class of elements that name none."""
-    return next((default.get("class", _MAIN) for default in root.findall("default")), _MAIN)
 
 
 def _classes(root: Element, tag: str) -> dict[str, dict[str, str]]:
