@@ -60,6 +60,14 @@ def test_a_comparison(
     assert ("reduced" in names) == (scene == "sphere_in_cylinder")  # it has no equations of a rod
 
 
+@pytest.mark.parametrize(("scene", "asked"), [("pushed_box", False), ("sled", True)])
+def test_a_comparison_asks_for_what_is_determined(command_line: Proofroll, scene: str, asked: bool) -> None:
+    """Of a box, whose corners share their forces in no known way, it asks for the sum of each pair alone."""
+    assert command_line("new", "comparison", "claim", "--scene", scene)[0] == 0
+    bounds = load_comparison("claim.toml").bands["close"].bounds
+    assert ("contact_forces" in bounds, "pair_forces" in bounds) == (asked, not asked)
+
+
 @pytest.mark.drill
 def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
     """A new engine announces its class from a package that hides no other, and passes its own conformance test."""
