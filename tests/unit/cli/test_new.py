@@ -60,6 +60,7 @@ def test_a_comparison(
     assert ("reduced" in names) == (scene == "sphere_in_cylinder")  # it has no equations of a rod
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(("scene", "asked"), [("pushed_box", False), ("sled", True)])
 def test_a_comparison_asks_for_what_is_determined(command_line: Proofroll, scene: str, asked: bool) -> None:
     """Of a box, whose corners share their forces in no known way, it asks for the sum of each pair alone."""
