@@ -28,7 +28,7 @@ from proofroll.report.comparison.records import (
     ShownObservable,
     WorstJudgement,
 )
-from proofroll.report.ladder.ladder import Absence, KnownTruth, LadderContent, RungFound, SideFound, TermFound
+from proofroll.report.ladder import Absence, KnownTruth, LadderContent, RungFound, SideFound, TermFound
 from proofroll.report.page.first_screen import ReportedAnswer
 from proofroll.robots.check.explain import RobotCause
 from proofroll.robots.check.records import (

@@ -29,8 +29,7 @@ def ladder(
     as_json: options.Json = False,
 ) -> None:
     """Compare one quantity across models of increasing detail. Each optional term is then off and on."""
-    from proofroll.report.ladder.ladder import ladder_content
-    from proofroll.report.ladder.tables import ladder_parts
+    from proofroll.report.ladder import ladder_content, ladder_parts
     from proofroll.studies.ladder.ladder import Ladder
 
     study = Ladder(

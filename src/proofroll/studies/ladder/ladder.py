@@ -55,7 +55,7 @@ class ModelAnswer:
 
 
 class Ladder:
-    """Plans, runs and times the models; :func:`proofroll.report.ladder.ladder.ladder_content` reports the results.
+    """Plans, runs and times the models; :func:`proofroll.report.ladder.ladder_content` reports the results.
 
     Attributes:
         ladder, switches: models to run and terms to switch.

@@ -10,7 +10,7 @@ from typing import Any
 from proofroll.core.errors import InputError, require_known
 from proofroll.files.toml import named_file, study_files, study_of
 from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_maps
-from proofroll.report.ladder.ladder import ladder_content
+from proofroll.report.ladder import ladder_content
 from proofroll.running import stopwatch
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner

@@ -15,8 +15,7 @@ from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
-from proofroll.report.ladder.ladder import LadderContent, ladder_content
-from proofroll.report.ladder.tables import rung_table, term_table
+from proofroll.report.ladder import LadderContent, ladder_content, rung_table, term_table
 from proofroll.report.terminal.screen import WIDEST, console
 from proofroll.running.case import Result, Status
 from proofroll.running.runner import Runner

@@ -1,1 +1,0 @@
-"""Ladder of models as records, sentences and tables."""
