@@ -153,7 +153,6 @@ def _comparison(name: str, place: str, loaded: Scene) -> str:
         if item.relative
         else f'{_quoted(key)} = "{item.value:g} {item.unit}"\n'
         for key, item in bounds(loaded, every).items()
-        if key != "contact_forces" or "pair_forces" not in loaded.observables  # how corners share them is open
     )
     rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able(loaded, preferred=True))
     return (
