@@ -61,6 +61,15 @@ def test_a_comparison(
 
 
 @pytest.mark.drill
+@pytest.mark.parametrize(("scene", "asked"), [("pushed_box", False), ("sled", True)])
+def test_a_comparison_asks_for_what_is_determined(command_line: Proofroll, scene: str, asked: bool) -> None:
+    """Of a box, whose corners share their forces in no known way, it asks for the sum of each pair alone."""
+    assert command_line("new", "comparison", "claim", "--scene", scene)[0] == 0
+    bounds = load_comparison("claim.toml").bands["close"].bounds
+    assert ("contact_forces" in bounds, "pair_forces" in bounds) == (asked, not asked)
+
+
+@pytest.mark.drill
 def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
     """A new engine announces its class from a package that hides no other, and passes its own conformance test."""
     assert proofroll("new", "engine", "my_engine")[0] == 0

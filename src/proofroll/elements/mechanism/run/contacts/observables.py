@@ -153,8 +153,10 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
     yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True)
     meaning = "contact forces, where they are determinate"
     told: dict[str, Any] = {"asked_for": False, "at_impacts": False, "of_contacts": True, "watched": True}
-    yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, always=_WRONG, **told)
-    if shared_pairs(mechanism.contacts):
+    sums = bool(shared_pairs(mechanism.contacts))  # how places of one pair share its force is seldom determined
+    further = {**told, "watched": not sums}
+    yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, always=_WRONG, **further)
+    if sums:
         meaning = "sums of the forces of each pair that touches at several places, where they are determinate"
         yield Observable("pair_forces", "N", meaning, Role.REACTION, floor=force, **told)
     if carried_bodies(mechanism.contacts):
