@@ -74,12 +74,14 @@ def judge(
         _judge_record(run, robot, control, _names(columns), layout, as_json=as_json)
     if layout:
         raise InputError("--as", layout, "it is for the record of a robot: give --robot, too")
+    from proofroll.core.number_format import exact
     from proofroll.files.scene_file import load_scene
     from proofroll.files.scene_sources import root_words
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.studies.judging import judge as judging
 
     written: Mapping[str, object] = {}
+    told = scene or named
     if named is None and scene is None:
         scene, written = _scene_of_run(run)
     if (named is None) == (not scene):
@@ -93,10 +95,11 @@ def judge(
     else:
         asked = shlex.join(
             [
-                *("proofroll", "judge", str(run), "--scene", scene or str(named)),
+                *("proofroll", "judge", str(run), *(("--scene", told) if told else ())),
                 *(word for text in settings or () for word in ("--set", text)),
                 *(word for text in tolerance or () for word in ("--tolerance", text)),
                 *(("--because", because) if because else ()),
+                *(("--time-limit", exact(time_limit)) if time_limit != RUN_TIME_LIMIT else ()),
                 *root_words(),
             ]
         )

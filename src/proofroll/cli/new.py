@@ -85,7 +85,7 @@ def probe(
 ) -> None:
     """Write a script that records a tenth of a second of a robot in the air in your simulator, for `judge`."""
     from proofroll.core.errors import require_known
-    from proofroll.files.scene_sources import StartsProbes, source_of
+    from proofroll.files.scene_sources import StartsProbes, root_words, source_of
 
     require_known("--for", program, _LAYOUTS, "there is no probe for it; choose from")
     require_known("--base", base, ("fixed", "free"), "choose one of")
@@ -98,7 +98,8 @@ def probe(
     if program == "isaaclab" and start.kind != "urdf":
         raise InputError("robot", robot, "Isaac Lab reads a URDF; give the robot's, or --for mujoco")
     name = f"probe_{re.sub('[^a-z0-9_]', '_', robot.stem.lower())}_{program}"
-    judge = f"proofroll judge {name}.npz --robot {shlex.quote(str(robot))} --as {_LAYOUTS[program]}"
+    words = "proofroll", "judge", f"{name}.npz", "--robot", str(robot), "--as", _LAYOUTS[program], *root_words()
+    judge = shlex.join(words)
     rows = (
         f"    {_quoted(joint)}: ({', '.join(f'{number:.6g}' for number in row)}),\n"
         for joint, row in start.joints.items()
@@ -144,6 +145,7 @@ def _say(path: Path, *commands: str) -> None:
 
 def _comparison(name: str, place: str, loaded: Scene) -> str:
     """Text of a comparison file: each engine that can run the scene, allowed one per cent of each motion."""
+    from proofroll.core.number_format import exact
     from proofroll.files.scene_file import read_scene_file
     from proofroll.studies.comparison.default_comparison import able, bounds, times_of
 
@@ -157,7 +159,7 @@ def _comparison(name: str, place: str, loaded: Scene) -> str:
     rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able(loaded, preferred=True))
     return (
         f'title = "{name}"\nquestion = "Which engines agree with the truth?"\nscene = {_quoted(place)}\n'
-        f"until = {until:g}\nevery = {every:g}\n\n"
+        f"until = {exact(until)}\nevery = {exact(every)}\n\n"
         "# Every combination of these values is run: [vary], then parameter = [value, value].\n\n"
         "# How far an observable may be from the truth, and why.\n"
         "# `proofroll check --keys WORD` describes every key.\n"

@@ -102,7 +102,7 @@ def report(
         raise InputError("--budget", budget, "runs on a cluster have none; drop --scheduler")
     left_out = [] if studies or only or budget else further_comparison_names()
     all_names = [*comparison_names(), *([] if left_out else further_comparison_names())]
-    names, parts = parts_of(studies, engine or []) if studies else (all_names, all_parts(engine or [], out))
+    names, parts = parts_of(studies, engine or [], out) if studies else (all_names, all_parts(engine or [], out))
     if only:
         names, parts = _of_groups(names, only), []
     if assigned and (parts or not studies):
@@ -270,16 +270,16 @@ def _command(
     tolerances: list[str],
 ) -> str:
     """Command that makes the report again."""
+    from proofroll.core.number_format import exact
+    from proofroll.files.scene_sources import root_words
+
     words = ["proofroll", "report", *studies]
-    for name in engines:
-        words += ["--engine", name]
-    for setting in settings:
-        words += ["--set", setting]
-    words += ["--budget", f"{budget:g}"] if budget else []
+    for option, texts in (("--engine", engines), ("--set", settings), ("--tolerance", tolerances)):
+        words += [word for text in texts for word in (option, text)]
+    words += ["--budget", exact(budget)] if budget else []
     words += ["--only", only] if only else []
-    for text in tolerances:
-        words += ["--tolerance", text]
-    return shlex.join(words if out == Path("out") else [*words, "--out", str(out)])
+    words += [] if out == Path("out") else ["--out", str(out)]
+    return shlex.join([*words, *root_words()])
 
 
 def _begin(number: int, total: int, words: str) -> str:

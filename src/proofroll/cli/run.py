@@ -160,13 +160,14 @@ def _preparing(engine: str, workers: Workers, *, forked: bool = False) -> Thread
 
 def _comparison(scene: str, engine: str, settings: list[str] | None, control: Path | None, until: float | None) -> str:
     """Command that compares the same run with the truth."""
+    from proofroll.core.number_format import exact
     from proofroll.files.scene_sources import root_words
 
     words = ["proofroll", "compare", scene, "--engine", engine]
     for text in settings or ():
         words += ["--set", text]
     words += [*(["--control", str(control)] if control else []), *root_words()]
-    words += ["--until", f"{until:g}"] if until is not None else []
+    words += ["--until", exact(until)] if until is not None else []
     return shlex.join(words)
 
 

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import shlex
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -66,13 +67,10 @@ def load_comparison(name: str) -> Comparison:
     if "gravity" in content:
         raise InputError("comparison", name, SCENE_IS_A_FOLDER)
     if "study" in content:
-        raise InputError(f"{path}: study", content["study"], f"is no comparison; proofroll report {name} runs it")
-    return _comparison(path, content)
-
-
-def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
+        again = shlex.join(["proofroll", "report", name])
+        raise InputError(f"{path}: study", content["study"], f"is no comparison; {again} runs it")
     with error_location(path.name):
-        return _checked(path, content)
+        return replace(_checked(path, content), asked=name)
 
 
 def _checked(path: Path, content: dict[str, Any]) -> Comparison:
@@ -83,7 +81,8 @@ def _checked(path: Path, content: dict[str, Any]) -> Comparison:
     if not isinstance(tables, list) or not tables:
         raise InputError(f"{place}: rows", tables, "give at least one engine; write [[rows]] before each")
     content["rows"] = [_prepared(f"{place}: rows.{index}", row) for index, row in enumerate(tables)]
-    program: dict[str, object] = {"left_out": 0, "budget": None, "spent": 0.0, "absent": {}}  # no file may have these
+    # No file may have these.
+    program: dict[str, object] = {"asked": "", "left_out": 0, "budget": None, "spent": 0.0, "absent": {}}
     comparison = validated(Comparison, content, place, name=path.stem, bands=bands, **program)
     for name, values in comparison.vary.items():
         if not values:

@@ -259,7 +259,7 @@ def lines_command(made: StepAnswer, engine: str) -> str:
 
 def _given(made: SceneAnswer | StepAnswer) -> list[str]:
     """Words of a command that ask the question of an answer."""
-    words = ["--tolerance", made.tolerance]
+    words = [word for text in made.tolerance.split(", ") for word in ("--tolerance", text)]
     for name, value in made.parameters.items():
         words += ["--set", f"{name}={value!r}"]
     return [*words, "--until", f"{made.until!r}", *root_words()]

@@ -109,6 +109,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "settings": labels.settings_text,
         "name_of": labels.name_of,
         "plain": plain,
+        "quoted": shlex.quote,
     }
     made.globals |= {
         "tables": tables,
@@ -146,5 +147,6 @@ def _again(comparison: ReportedComparison, run: ReportedRun) -> str:
     """Command that repeats one run."""
     words = ["proofroll", "run", comparison.scene, "--engine", run.engine]
     for name, value in run.parameters.items():
-        words += ["--set", f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"]
-    return shlex.join([*words, "--until", f"{comparison.until:g}", "--every", f"{comparison.every:g}", *root_words()])
+        words += ["--set", f"{name}={number_format.exact(value) if isinstance(value, float) else value}"]
+    times = "--until", number_format.exact(comparison.until), "--every", number_format.exact(comparison.every)
+    return shlex.join([*words, *times, *root_words()])
