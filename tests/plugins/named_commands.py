@@ -45,8 +45,9 @@ def proposed() -> Iterator[str]:
     """Each command in a text of the package, and each that it makes of words: ``file: command``.
 
     What stands in braces of a text is ``{}``; docstrings propose nothing.
+    Words given to ``command_line`` are a command, too.
     """
-    command = re.compile(rf"proofroll (?:(?:{'|'.join(program().commands)})\b|\*)(?:(?!proofroll )[^;`\n])*")
+    command = re.compile(rf"proofroll (?:(?:{'|'.join(program().commands)})\b|self)(?:(?!proofroll )[^;`\n])*")
     for path in sorted(SOURCE.rglob("*")):
         place = path.relative_to(SOURCE).as_posix()
         if path.suffix == ".py":
@@ -58,16 +59,14 @@ def proposed() -> Iterator[str]:
 
 
 def _texts(found: list[ast.AST]) -> Iterator[str]:
-    """Texts of a module but docstrings; words of a list or a tuple that begins with the program are one."""
+    """Texts of a module but docstrings, and the first words of commands that it makes."""
     bodies = [node.body[0] for node in found if isinstance(node, _SCOPES) and node.body]
     known = {id(item.value) for item in bodies if isinstance(item, ast.Expr)}
     for node in found:
         if isinstance(node, ast.JoinedStr):
             known |= {id(value) for value in node.values}
             yield "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values)
-        elif isinstance(node, ast.List | ast.Tuple) and len(node.elts) > 1:
-            first, second = node.elts[:2]
-            if isinstance(first, ast.Constant) and first.value == "proofroll":
-                yield f"proofroll {second.value if isinstance(second, ast.Constant) else ast.unparse(second)}"
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) == "command_line" and node.args:
+            yield f"proofroll {ast.unparse(node.args[0]).lstrip('*(').split(',')[0].strip(chr(39))}"
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in known:
             yield node.value

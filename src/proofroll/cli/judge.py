@@ -74,9 +74,8 @@ def judge(
         _judge_record(run, robot, control, _names(columns), layout, as_json=as_json)
     if layout:
         raise InputError("--as", layout, "it is for the record of a robot: give --robot, too")
-    from proofroll.core.number_format import exact
     from proofroll.files.scene_file import load_scene
-    from proofroll.files.scene_sources import root_words
+    from proofroll.files.scene_sources import command_line
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.studies.judging import judge as judging
 
@@ -93,16 +92,9 @@ def judge(
     if as_json:
         options.write_json(judged.content())
     else:
-        asked = shlex.join(
-            [
-                *("proofroll", "judge", str(run), *(("--scene", told) if told else ())),
-                *(word for text in settings or () for word in ("--set", text)),
-                *(word for text in tolerance or () for word in ("--tolerance", text)),
-                *(("--because", because) if because else ()),
-                *(("--time-limit", exact(time_limit)) if time_limit != RUN_TIME_LIMIT else ()),
-                *root_words(),
-            ]
-        )
+        seconds = time_limit if time_limit != RUN_TIME_LIMIT else None
+        given = {"set": settings, "tolerance": tolerance, "because": because, "time_limit": seconds}
+        asked = command_line("judge", str(run), scene=told, **given)
         lines = _lines(judged, run.name, asked, _names(columns), everything=everything)
         options.show_lines(lines, widest=WIDTH)
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)

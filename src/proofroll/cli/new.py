@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import keyword
 import re
-import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -85,7 +84,7 @@ def probe(
 ) -> None:
     """Write a script that records a tenth of a second of a robot in the air in your simulator, for `judge`."""
     from proofroll.core.errors import require_known
-    from proofroll.files.scene_sources import StartsProbes, root_words, source_of
+    from proofroll.files.scene_sources import StartsProbes, command_line, source_of
 
     require_known("--for", program, _LAYOUTS, "there is no probe for it; choose from")
     require_known("--base", base, ("fixed", "free"), "choose one of")
@@ -98,8 +97,7 @@ def probe(
     if program == "isaaclab" and start.kind != "urdf":
         raise InputError("robot", robot, "Isaac Lab reads a URDF; give the robot's, or --for mujoco")
     name = f"probe_{re.sub('[^a-z0-9_]', '_', robot.stem.lower())}_{program}"
-    words = "proofroll", "judge", f"{name}.npz", "--robot", str(robot), "--as", _LAYOUTS[program], *root_words()
-    judge = shlex.join(words)
+    judge = command_line("judge", f"{name}.npz", "--as", _LAYOUTS[program], robot=robot)
     rows = (
         f"    {_quoted(joint)}: ({', '.join(f'{number:.6g}' for number in row)}),\n"
         for joint, row in start.joints.items()

@@ -29,7 +29,6 @@ def stability(
     """Map up to which step each engine is stable, and right. The map goes along axes of extremes."""
     from proofroll.report.page.html import templates
     from proofroll.report.pages import rendered
-    from proofroll.report.parts import words_given
     from proofroll.report.stability.part import StabilityPart
     from proofroll.report.stability.tables import stability_parts
     from proofroll.running.store import write_text
@@ -45,7 +44,7 @@ def stability(
     with options.progress_bar("stability", None) as advance:
         study, path = make_stability(asked, axes, runner, out, engines=engine or [], effort=effort, progress=advance)
     part = StabilityPart(asked, engine or [], study, folder=path.stem)
-    part.given = words_given(scene, part.engines, out)
+    part.named, part.out = scene, out
     write_text(path.with_suffix(".html"), rendered(templates(), "stability_page.html", entry=part.entry()))
     options.show(study, as_json, lambda: stability_parts(study, path))
     if study.absent and not study.points:

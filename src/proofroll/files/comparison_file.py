@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import shlex
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from proofroll.core.validation import strict, validated
 from proofroll.core.verdict import Verdict
 from proofroll.files.data_folders import study_folders
 from proofroll.files.scene_file import SCENE_IS_A_FOLDER, load_scene, scene_names
+from proofroll.files.scene_sources import command_line
 from proofroll.files.toml import named_file, read_toml, study_of
 
 # Most combinations of parameters; a run takes about a second, so more are a mistake.
@@ -67,7 +67,7 @@ def load_comparison(name: str) -> Comparison:
     if "gravity" in content:
         raise InputError("comparison", name, SCENE_IS_A_FOLDER)
     if "study" in content:
-        again = shlex.join(["proofroll", "report", name])
+        again = command_line("report", name)
         raise InputError(f"{path}: study", content["study"], f"is no comparison; {again} runs it")
     with error_location(path.name):
         return replace(_checked(path, content), asked=name)

@@ -5,7 +5,6 @@ Kinds of parts are plug-ins, our own too: entry points of the group ``proofroll.
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -14,7 +13,7 @@ from typing import Any, ClassVar, Protocol
 
 from proofroll.core.entry_points import loaded
 from proofroll.core.errors import ProofrollError, require_known
-from proofroll.files.scene_sources import root_words, source_of
+from proofroll.files.scene_sources import command_line, source_of
 from proofroll.files.toml import named_file, read_toml, study_files
 from proofroll.report.pages import section_id
 from proofroll.running.runner import Runner
@@ -60,7 +59,8 @@ class Part(Protocol):
         order: position among the parts of a report, the smallest first.
         words: name of the part, for a person.
         command: words behind ``proofroll`` that make it, as ``paper regimes``.
-        given: words behind these: the study as a person named it, and options; see :func:`words_given`.
+        named: name or path of the study, as a person gave it.
+        out: folder of its results.
         template: in the folder ``templates`` beside the class's module, with the macro
             ``section(entry, index, pictures, content)``.
         names: additional names for the template; they must differ from those of other parts.
@@ -77,7 +77,8 @@ class Part(Protocol):
     names: ClassVar[Mapping[str, Any]] = {}
     asked: Any
     engines: Sequence[str] = ()
-    given: Sequence[str] = ()
+    named: str = ""
+    out: Path = Path("out")
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> Part:
@@ -95,7 +96,7 @@ class Part(Protocol):
     @property
     def head(self) -> dict[str, str]:
         """``name`` of the file, ``title``, ``question``, ``scene`` and the ``command`` that makes it."""
-        command = shlex.join(["proofroll", *self.command.split(), *self.given])
+        command = command_line(*self.command.split(), self.named, engine=[*self.engines], out=self.out)
         return {key: getattr(self.asked, key) for key in ("name", "title", "question", "scene")} | {"command": command}
 
     def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- for those that keep something
@@ -119,16 +120,10 @@ def part_kinds() -> tuple[type[Part], ...]:
     return tuple(sorted((kind for _, kind in loaded(GROUP, like=Part)), key=lambda kind: kind.order))
 
 
-def words_given(name: str, engines: Sequence[str], out: Path) -> list[str]:
-    """Words of a command that ask for a study by its name or path, of some engines, with results under ``out``."""
-    folder = [] if out == Path("out") else ["--out", str(out)]
-    return [name, *(word for engine in engines for word in ("--engine", engine)), *folder, *root_words()]
-
-
 def _loaded(kind: type[Part], path: Path, name: str, engines: Sequence[str], out: Path) -> Part:
-    """Part from a study's file, with the words of the command that makes it."""
+    """Part from a study's file, with the name or path of the study and the folder of its results."""
     part = kind.load(path, engines)
-    part.given = words_given(name, part.engines, out)
+    part.named, part.out = name, out
     return part
 
 

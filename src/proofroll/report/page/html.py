@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from proofroll.core import number_format
 from proofroll.files.json_data import plain
-from proofroll.files.scene_sources import root_words
+from proofroll.files.scene_sources import command_line
 from proofroll.report import labels
 from proofroll.report.answer import picture, sentences
 from proofroll.report.comparison import tables, verdict_matrix
@@ -145,8 +145,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
 
 def _again(comparison: ReportedComparison, run: ReportedRun) -> str:
     """Command that repeats one run."""
-    words = ["proofroll", "run", comparison.scene, "--engine", run.engine]
-    for name, value in run.parameters.items():
-        words += ["--set", f"{name}={number_format.exact(value) if isinstance(value, float) else value}"]
-    times = "--until", number_format.exact(comparison.until), "--every", number_format.exact(comparison.every)
-    return shlex.join([*words, *times, *root_words()])
+    values = run.parameters.items()
+    settings = [f"{name}={number_format.exact(item) if isinstance(item, float) else item}" for name, item in values]
+    times = {"until": comparison.until, "every": comparison.every}
+    return command_line("run", comparison.scene, engine=run.engine, set=settings, **times)

@@ -40,6 +40,7 @@ _STILL = 0.01  # part of the change of velocity in a step up to which a joint st
 _ROWS = 5  # rows whose accelerations are computed
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEW = 150  # equations by which a scheme that is rare is looked at first
+_UNKNOWN = 3.0  # times what half an interval makes that steps between rows may make: efforts jump at instants
 _BOUND = 0.05  # part of the rows at which friction is at its bound, at least
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
 
@@ -178,7 +179,7 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
         sets = [several_causes(rows, law.joints, right_numbers(law)) for rows in likely]
         named = min(filter(None, sets), key=len, default=named)
     # The steps of the program may be no rows.
-    between = not named and bar < best.off <= min(item.rows.unknown for item in trials)
+    between = not named and bar < best.off <= _UNKNOWN * min(item.rows.unknown for item in trials)
     tried = len(NUMBERS) + len(best.added)
     softened = not named and any(_softened(item.rows, law, robot) for item in trials)
     return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between, softened=softened)
