@@ -158,7 +158,11 @@ def _prepared(place: str, content: object) -> dict[str, Any]:
 
 def _checked_row(place: str, row: Row, comparison: Comparison, observables: Mapping[str, Observable]) -> Row:
     """A row with its bounds in the units of the scene, after checks that its types do not express."""
-    _check_engine(place, row)
+    try:
+        if (engine := parse_engine(row.engine).name) != "truth":
+            require_engine(engine)
+    except InputError as error:
+        raise error.within(f"{place}.engine", row.engine) from None
     require_known(f"{place}.tolerance", row.tolerance, comparison.bands)
     if row.ladder != [1.0]:
         _check_ladder(place, row.ladder)
@@ -179,15 +183,6 @@ def _checked_row(place: str, row: Row, comparison: Comparison, observables: Mapp
     if not comparison.combinations(row.only):
         raise InputError(f"{place}.only", row.only, "no point of the comparison fits, so the row would never be run")
     return replace(row, limit=limit, bound=bound)
-
-
-def _check_engine(place: str, row: Row) -> None:
-    try:
-        name = parse_engine(row.engine).name
-        if name != "truth":
-            require_engine(name)
-    except InputError as error:
-        raise error.within(f"{place}.engine", row.engine) from None
 
 
 def _check_expectations(place: str, row: Row) -> None:

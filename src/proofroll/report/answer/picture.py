@@ -122,7 +122,7 @@ def _frame(axes: _Axes) -> Iterator[str]:
     for decade in range(axes.left, axes.right + 1):
         x, _ = axes.place(DrawnRun(10.0**decade, 1.0))
         yield _rule(x, _TOP, x, bottom)
-        yield _text(x, bottom + 16, _speed_words(decade), "middle")
+        yield _text(x, bottom + 16, f"{10.0**-decade:g}×", "middle")
     for decade in range(axes.low, axes.high + 1, max(1, round((axes.high - axes.low) / 6))):
         _, y = axes.place(DrawnRun(10.0**axes.left, 10.0**decade))
         yield _rule(_LEFT, y, end, y)
@@ -132,11 +132,6 @@ def _frame(axes: _Axes) -> Iterator[str]:
     yield _text(end - 2, y - 4, "allowed", "end")
     yield _text(_LEFT, 12, "largest error over what is allowed", "start")
     yield _text(end, bottom + 32, "speed, times real time; the fastest at the left", "end")
-
-
-def _speed_words(decade: int) -> str:
-    """Speed of a cost of 10 to a power."""
-    return f"{10.0**-decade:g}×"
 
 
 def _rule(x: float, y: float, to_x: float, to_y: float) -> str:

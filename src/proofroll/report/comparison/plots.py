@@ -103,7 +103,8 @@ def point_curves(outcome: Outcome) -> list[PointCurves]:
         kind = kind_of(scene)
         further = {item.name: item for item in kind.curves(scene, truth)} if kind is not None else {}
         observables = scene.observables | further
-        drawn = {key: item for key, item in observables.items() if item.role in _DRAWN and _curve(truth, key)}
+        curves = {key for key in observables if key in truth and truth[key].dims == ("time",)}
+        drawn = {key: item for key, item in observables.items() if item.role in _DRAWN and key in curves}
         engines = [(row, run, motion.dataset) for row, run, motion in runs_at(outcome, name)]
         entries.append(
             PointCurves(
@@ -136,11 +137,6 @@ def kept(curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray
     if length <= most:
         return np.arange(length)
     return np.unique(np.concatenate([M4Downsampler().downsample(np.ascontiguousarray(c), n_out=most) for c in curves]))
-
-
-def _curve(truth: xr.Dataset, name: str) -> bool:
-    """True if a variable is a single curve over time; arrays of several curves are judged but not drawn."""
-    return name in truth and truth[name].dims == ("time",)
 
 
 def _observable(

@@ -41,6 +41,7 @@ _ROWS = 5  # rows whose accelerations are computed
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEW = 150  # equations by which a scheme that is rare is looked at first
 _UNKNOWN = 3.0  # times what half an interval makes that steps between rows may make: efforts jump at instants
+_HALF = 0.5  # part of what the right numbers leave that several together may leave
 _BOUND = 0.05  # part of the rows at which friction is at its bound, at least
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
 
@@ -160,7 +161,8 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
     scheme, best, _ = min(trials, key=lambda trial: trial.rows.off / trial.rows.size)
     scale = 1 / best.size
     if best.exact:
-        armed = [item for item in trials if not item.scheme.implicit and _fits(item.rows, "implicit")]
+        explicit = [item.rows for item in trials if not item.scheme.implicit]
+        armed = [item for item in explicit if rms(item.left - item.columns["implicit"]) <= SAFETY * item.rounding]
         imitated = scheme.implicit and bool(armed)
         damped = scheme.damped and bool(robot.damping.any())
         return AirFit(best.off * scale, SAFETY * best.rounding * scale, damped=damped, imitated=imitated)
@@ -177,7 +179,8 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
     if together and not closed:
         likely = [rows for item, rows, hopeful in trials if hopeful and not item.stages]
         sets = [several_causes(rows, law.joints, right_numbers(law)) for rows in likely]
-        named = min(filter(None, sets), key=len, default=named)
+        halving = [found for found in sets if found and found[0].after <= _HALF * right.after]
+        named = min(halving, key=len, default=named)
     # The steps of the program may be no rows.
     between = not named and bar < best.off <= _UNKNOWN * min(item.rows.unknown for item in trials)
     tried = len(NUMBERS) + len(best.added)
@@ -203,11 +206,6 @@ def _softened(rows: AirRows, law: ControlLaw, robot: AirRobot) -> bool:
     within = np.all((more <= near) & (more >= -2 * friction[rubbing] - near))
     left = rows.left - np.einsum("rij,rj->ri", columns, more).ravel()
     return bool(within and rows.rounded(left) and np.mean(np.abs(more) <= near) >= _BOUND)
-
-
-def _fits(rows: AirRows, name: str) -> bool:
-    """True if a number of 1 leaves no more than rounding."""
-    return rms(rows.left - rows.columns[name]) <= SAFETY * rows.rounding
 
 
 def _causes(rows: AirRows, law: ControlLaw) -> list[LayerCause]:

@@ -34,7 +34,7 @@ from proofroll.robots.control.differences import efforts_of
 from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, LayerCause
 from proofroll.robots.model import Array
 
-_MOST = 0.5  # part of the equations that numbers may be, and of the difference that they may leave
+_MOST = 0.5  # part of the equations that numbers may be
 _OF_A_POINT = 4  # numbers of a mass at a point
 _LISTED = 4  # joints whose numbers are told one by one
 _WIDTHS, _DEGREE = (161, 81, 41, 21, 11), 3  # rows that are smoothed together, and degree of the polynomials
@@ -82,10 +82,9 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
     """
     rows, groups = _moving(rows, joints)
     carried: list[LayerCause] | None = None
-    closing = min(SAFETY * rows.rounding, _MOST * rows.off)
     for chosen in _closing(groups, rows):
         columns = _columns(chosen)
-        if columns.shape[1] > _OF_A_POINT and carried is None and (carried := _carried(rows, closing)):
+        if columns.shape[1] > _OF_A_POINT and carried is None and (carried := _carried(rows)):
             return carried
         values, remainder = _solved(columns, rows.left)
         places = np.cumsum([0, *(group.columns.shape[1] for group in chosen)])
@@ -94,7 +93,7 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
             abs(scale + 1) <= ROUND_OFF for scale in scales
         ):  # without efforts, masses of nothing explain any motion
             continue
-        if columns.shape[1] <= _MOST * len(rows.left) and rms(remainder) <= closing:
+        if columns.shape[1] <= _MOST * len(rows.left) and rms(remainder) <= SAFETY * rows.rounding:
             return [*_told(rows, chosen, columns, values, right)]
     return []
 
@@ -185,15 +184,15 @@ def _told(
             yield LayerCause(group.kind, f"{words} ({proof})", size, remainder / rows.size)
 
 
-def _carried(rows: AirRows, most: float) -> list[LayerCause]:
-    """Cause: the body that carries a mass at a point of it, if no more than ``most`` is left; empty: none does."""
+def _carried(rows: AirRows) -> list[LayerCause]:
+    """Cause: the body that carries a mass at a point of it, if that leaves no more than rounding; empty: none does."""
     causes: list[tuple[float, LayerCause]] = []
     for body, columns in rows.added.items():
         sizes = np.linalg.norm(columns, axis=0)
         if sizes[0] <= ROUND_OFF * sizes.max():  # about a fixed axis no mass shows
             continue
         values, remainder = _solved(columns, rows.left)
-        if rms(remainder) > most:
+        if rms(remainder) > SAFETY * rows.rounding:
             continue
         start = np.array([abs(values[0]) or 1.0, *values[1:4]])
 
@@ -202,7 +201,7 @@ def _carried(rows: AirRows, most: float) -> list[LayerCause]:
 
         numbers = least_squares_parameters(left, start, float(np.abs(start).max()))
         distance = rms(left(numbers))
-        if distance <= most and numbers[0] > 0:
+        if distance <= SAFETY * rows.rounding and numbers[0] > 0:
             place = ", ".join(f"{x:.3g}" for x in (numbers[1:] / numbers[0]).round(4))
             words = f"{body} carries {numbers[0]:.4g} kg more, at ({place}) m"
             sentence = f"{words} ({rows.proof(distance)})"

@@ -101,6 +101,7 @@ class MujocoRobots:
         frames: list[tuple[Array, Array]] = []
         arrays = evaluate(request, joints, dofs, lambda k: _at(request, model, data, joints, dofs, k, frames))
         groups = {name: _group(model, body) for name, body in home.items()}
+        of_joints = model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)
         return Reading(
             joints=joints,
             dofs=dofs,
@@ -109,7 +110,7 @@ class MujocoRobots:
             inertia={name: body.inertia for name, body in groups.items()},
             position={name: np.array([p[body] for p, _ in frames]) for name, body in home.items()},
             rotation={name: np.array([R[body].reshape(3, 3) for _, R in frames]) for name, body in home.items()},
-            coupled=_coupled(model, joints),
+            coupled=tuple(joints[number] for number in model.eq_obj1id[of_joints].tolist()),
             remarks=softness,
             **arrays,
         )
@@ -218,10 +219,6 @@ def _group(model: Any, body: int) -> RobotBody:
             poses[index] = (p + R @ model.body_pos[index], R @ matrix(model.body_quat[index]))
         parts.append((body_of(model, index, ""), *poses[index]))
     return composed("", parts)
-
-
-def _coupled(model: Any, joints: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(joints[number] for number in model.eq_obj1id[model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)].tolist())
 
 
 _KINDS = {0: JointKind.FREE, 1: JointKind.SPHERICAL, 2: JointKind.PRISMATIC, 3: JointKind.REVOLUTE}

@@ -38,11 +38,6 @@ def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Ver
     )
 
 
-def _no_motion(reference: Reference) -> bool:
-    """True if the truth has no unique motion to the end."""
-    return bool(reference.ill_posed or reference.ended)
-
-
 @dataclass(frozen=True)
 class ComparedPoint:
     """One point of the parameters: the scene there and its truth, loaded once for all reports.
@@ -159,7 +154,7 @@ class Outcome:
             runs = [run for run in self.runs if point_name(run.parameters) == name]
             judged = {item.observable for run in runs for item in run.judgements}
             roles = {point.scene.observables[key].role for key in judged}
-            if roles == {Role.RESIDUAL} and point.reference is not None and _no_motion(point.reference):
+            if roles == {Role.RESIDUAL} and (of := point.reference) is not None and (of.ill_posed or of.ended):
                 names.append(name)
         return names
 

@@ -70,17 +70,13 @@ def classed(root: Element, tag: str) -> Iterator[Classed]:
                 yield from below(child, child if child.tag == "body" else body, inherited)
 
     for world in root.findall("worldbody"):
-        yield from below(world, world, _main(root))
+        main = next((default.get("class", _MAIN) for default in root.findall("default")), _MAIN)
+        yield from below(world, world, main)
 
 
 def with_classes(root: Element, tag: str) -> Iterator[tuple[Element, dict[str, str]]]:
     """All elements of a tag below <worldbody>, with their attributes, own and inherited from the class."""
     return ((item.element, item.given) for item in classed(root, tag))
-
-
-def _main(root: Element) -> str:
-    """Name of the class of elements that name none."""
-    return next((default.get("class", _MAIN) for default in root.findall("default")), _MAIN)
 
 
 def _classes(root: Element, tag: str) -> dict[str, dict[str, str]]:
@@ -182,7 +178,9 @@ def _add(
         parent.attrib.pop("material", None)
     remove_height_fields(root, shapes)
     solid = _solid(root, shapes) if contacts else set[Element]()
-    remarks = [*remove_meshes(root, shapes, file.parent, inside, solid), *_gravity_compensations(root)]
+    remarks = [*remove_meshes(root, shapes, file.parent, inside, solid)]
+    weightless = [body for body in root.iter("body") if body.attrib.pop("gravcomp", "0") not in {"0", "0.0"}]
+    remarks += [LintRemark("note", f"body {body.get('name', '')}", COMPENSATION) for body in weightless]
     remarks += _lost_shapes(root, shapes, solid) if contacts else []
     parts[f"{len(parts)}.xml"] = root
     for model in root.iter("model"):
@@ -274,13 +272,6 @@ def _lost_shapes(root: Element, shapes: Sequence[Classed], solid: set[Element]) 
         if shape.element in solid:
             kind = "mesh" if shape.given.get("mesh") else "height field"
             yield LintRemark("note", f"{kind} of {shape.body.get('name', 'the world')}", NO_SHAPE)
-
-
-def _gravity_compensations(root: Element) -> Iterator[LintRemark]:
-    """Removes compensation of gravity from bodies; yields a remark for each."""
-    for body in root.iter("body"):
-        if body.attrib.pop("gravcomp", "0") not in {"0", "0.0"}:
-            yield LintRemark("note", f"body {body.get('name', '')}", COMPENSATION)
 
 
 def name_all(root: Element) -> None:
