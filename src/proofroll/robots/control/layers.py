@@ -56,6 +56,7 @@ from proofroll.robots.control.differences import (
     efforts_of,
     held_rows,
     instant_rows,
+    rows_are_steps,
     servo_rows,
     sources,
     targets_of,
@@ -234,7 +235,7 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     if fit.off > fit.bar and not (white and floats) and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
-    fit = dataclasses.replace(fit, between=fit.between and not (stepwise or _rows_are_steps(record, law)))
+    fit = dataclasses.replace(fit, between=fit.between and not (stepwise or rows_are_steps(record, law)))
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
     hidden = white if floats or not fit.causes else None
@@ -260,18 +261,6 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
         causes=fit.causes,
         tried=0 if earlier else fit.tried,
     )
-
-
-def _rows_are_steps(record: ControlRecord, law: ControlLaw) -> bool:
-    """True if places move by the velocity after each row and not by that before, as in steps of semi-implicit Euler."""
-    q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
-    if q is None or v is None:
-        return False
-    h = np.diff(record.time)[:, None]
-    rounding = 2 * record.rounding_of("q", law.joints)[1:] + h * record.rounding_of("v", law.joints)[1:]
-    bars = rounding + ROUND_OFF * np.abs(q).max()
-    moved = np.diff(q, axis=0)
-    return bool(np.all(np.abs(moved - h * v[1:]) <= bars) and np.any(np.abs(moved - h * v[:-1]) > 2 * bars))
 
 
 def _of_another_robot(
@@ -367,14 +356,8 @@ def _explained(
         together = _together(name, candidates, evidence, bars, time)
         causes = causes if together is None else [together]
     closing = [cause for cause in causes if cause.after <= rounding]
-    causes = closing or [_with_rest(cause, cause.after / distance) for cause in causes]
+    causes = closing or [cause.with_rest(cause.after / distance) for cause in causes]
     return {"causes": tuple(causes), "tried": tried, "known": len(candidates)}
-
-
-def _with_rest(cause: LayerCause, part: float) -> LayerCause:
-    """A cause that says which part of the difference it leaves."""
-    rest = f"{cause.sentence}; a cause is missing: {part:.2g} of the difference is left"
-    return dataclasses.replace(cause, sentence=rest)
 
 
 def _together(

@@ -255,6 +255,11 @@ class LayerCause:
     after: float
     numbers: int = 0
 
+    def with_rest(self, part: float) -> LayerCause:
+        """The cause, which says which part of the difference it leaves."""
+        rest = f"{self.sentence}; a cause is missing: {part:.2g} of the difference is left"
+        return replace(self, sentence=rest)
+
 
 @dataclass(frozen=True)
 class Layer:
