@@ -15,10 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from typer.core import TyperGroup as Group
-from typer.main import get_command
+from named_commands import unknown_words
 
-from proofroll.cli import app
 from proofroll.cli.report import report
 from proofroll.core.engine import Sample
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring
@@ -303,23 +301,6 @@ def test_modules_that_a_page_names_are_there(page: str) -> None:
             except (ImportError, AttributeError):
                 missing.append(name)
     assert missing == []
-
-
-def unknown_words(text: str) -> list[str]:
-    """Commands of proofroll that prose names in code and that are not there, and options that their command lacks."""
-    program = get_command(app)
-    assert isinstance(program, Group)
-    unknown = []
-    for name, rest in re.findall(r"`proofroll ([a-z]\w*)([^`\n]*)", text):
-        command = program.commands.get(name)
-        if command is None:
-            unknown.append(name)
-            continue
-        parts = [command, *(command.commands.values() if isinstance(command, Group) else ())]
-        known = {option for part in parts for item in part.params for option in (*item.opts, *item.secondary_opts)}
-        named = re.findall(r"(?<![\w-])--[a-z][\w-]*", rest)
-        unknown += [f"{name} {option}" for option in named if option not in known | {"--help"}]
-    return unknown
 
 
 @pytest.mark.parametrize("page", [*(f"docs/{page}.md" for page in PAGES), "README.md", "CONTRIBUTING.md"])

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields, is_dataclass, replace
+from html import unescape
 from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
+from folded import whole
 from invented import further, stability_study
 from invented_answers import reported
 from report_schema import SCHEMA, problems
@@ -67,9 +69,18 @@ def test_every_part_of_the_default_report_is_found_in_its_order(
     assert [part.key for part in parts] == sorted((part.key for part in parts), key=keys.index)
     assert {part.key for part in parts} == set(keys)
     for part in parts:
-        comparisons, found = parts_of(["paper", part.head["name"]], [])
+        comparisons, found = parts_of(["paper", part.head["name"]], [], tmp_path)
         assert comparisons == ["paper"]
         assert [other.head for other in found] == [part.head]
+
+
+def test_a_comparison_that_is_cut_names_its_file(report: Report) -> None:
+    """Where combinations are left out, both commands that have them name the file as it was asked for, as one word."""
+    first, *others = report.content.comparisons
+    cut = replace(report.content, comparisons=[replace(first, left_out=3, asked="my claim.toml"), *others])
+    text = unescape(whole(page(cut, report.curves)))
+    for command in ("compare", "report"):
+        assert f"<code>proofroll {command} 'my claim.toml'</code>" in text
 
 
 def test_content_is_made_once_for_each_part(made: tuple[Outcome, Store]) -> None:

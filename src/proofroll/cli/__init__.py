@@ -23,7 +23,6 @@ from proofroll.cli.diff import diff
 from proofroll.cli.engines import engines
 from proofroll.cli.export import export
 from proofroll.cli.judge import judge
-from proofroll.cli.ladder import ladder
 from proofroll.cli.lists import cite, findings, scenes
 from proofroll.cli.new import new
 from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
@@ -31,7 +30,7 @@ from proofroll.cli.recommend import recommend
 from proofroll.cli.replay import replay
 from proofroll.cli.report import report
 from proofroll.cli.run import run
-from proofroll.cli.stability import stability
+from proofroll.cli.studies import ladder, stability
 from proofroll.cli.watch import watch
 from proofroll.core.entry_points import broken, leave_out, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, choices

@@ -75,11 +75,12 @@ def judge(
     if layout:
         raise InputError("--as", layout, "it is for the record of a robot: give --robot, too")
     from proofroll.files.scene_file import load_scene
-    from proofroll.files.scene_sources import root_words
+    from proofroll.files.scene_sources import command_line
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.studies.judging import judge as judging
 
     written: Mapping[str, object] = {}
+    told = scene or named
     if named is None and scene is None:
         scene, written = _scene_of_run(run)
     if (named is None) == (not scene):
@@ -91,15 +92,9 @@ def judge(
     if as_json:
         options.write_json(judged.content())
     else:
-        asked = shlex.join(
-            [
-                *("proofroll", "judge", str(run), "--scene", scene or str(named)),
-                *(word for text in settings or () for word in ("--set", text)),
-                *(word for text in tolerance or () for word in ("--tolerance", text)),
-                *(("--because", because) if because else ()),
-                *root_words(),
-            ]
-        )
+        seconds = time_limit if time_limit != RUN_TIME_LIMIT else None
+        given = {"set": settings, "tolerance": tolerance, "because": because, "time_limit": seconds}
+        asked = command_line("judge", str(run), scene=told, **given)
         lines = _lines(judged, run.name, asked, _names(columns), everything=everything)
         options.show_lines(lines, widest=WIDTH)
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)

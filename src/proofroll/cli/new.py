@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import keyword
 import re
-import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -85,7 +84,7 @@ def probe(
 ) -> None:
     """Write a script that records a tenth of a second of a robot in the air in your simulator, for `judge`."""
     from proofroll.core.errors import require_known
-    from proofroll.files.scene_sources import StartsProbes, source_of
+    from proofroll.files.scene_sources import StartsProbes, command_line, source_of
 
     require_known("--for", program, _LAYOUTS, "there is no probe for it; choose from")
     require_known("--base", base, ("fixed", "free"), "choose one of")
@@ -98,7 +97,7 @@ def probe(
     if program == "isaaclab" and start.kind != "urdf":
         raise InputError("robot", robot, "Isaac Lab reads a URDF; give the robot's, or --for mujoco")
     name = f"probe_{re.sub('[^a-z0-9_]', '_', robot.stem.lower())}_{program}"
-    judge = f"proofroll judge {name}.npz --robot {shlex.quote(str(robot))} --as {_LAYOUTS[program]}"
+    judge = command_line("judge", f"{name}.npz", "--as", _LAYOUTS[program], robot=robot)
     rows = (
         f"    {_quoted(joint)}: ({', '.join(f'{number:.6g}' for number in row)}),\n"
         for joint, row in start.joints.items()
@@ -144,6 +143,7 @@ def _say(path: Path, *commands: str) -> None:
 
 def _comparison(name: str, place: str, loaded: Scene) -> str:
     """Text of a comparison file: each engine that can run the scene, allowed one per cent of each motion."""
+    from proofroll.core.number_format import exact
     from proofroll.files.scene_file import read_scene_file
     from proofroll.studies.comparison.default_comparison import able, bounds, times_of
 
@@ -157,7 +157,7 @@ def _comparison(name: str, place: str, loaded: Scene) -> str:
     rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able(loaded, preferred=True))
     return (
         f'title = "{name}"\nquestion = "Which engines agree with the truth?"\nscene = {_quoted(place)}\n'
-        f"until = {until:g}\nevery = {every:g}\n\n"
+        f"until = {exact(until)}\nevery = {exact(every)}\n\n"
         "# Every combination of these values is run: [vary], then parameter = [value, value].\n\n"
         "# How far an observable may be from the truth, and why.\n"
         "# `proofroll check --keys WORD` describes every key.\n"

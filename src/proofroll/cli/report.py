@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -87,6 +86,7 @@ def report(
 
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
+    from proofroll.files.scene_sources import command_line
     from proofroll.report.page.growing import begun
     from proofroll.report.parts import all_parts, parts_of
     from proofroll.report.terminal.screen import WIDTH
@@ -95,14 +95,13 @@ def report(
     from proofroll.running.store import alone_in
     from proofroll.studies.comparison.by_name import comparison_named
 
-    begin = _processor_seconds()
-    earlier = _earlier(against, comment)
-    workers, assigned = Workers(), options.assignments(settings)
+    begin, earlier, workers = _processor_seconds(), _earlier(against, comment), Workers()
+    assigned = options.assignments(settings)
     if budget and scheduler:
         raise InputError("--budget", budget, "runs on a cluster have none; drop --scheduler")
     left_out = [] if studies or only or budget else further_comparison_names()
     all_names = [*comparison_names(), *([] if left_out else further_comparison_names())]
-    names, parts = parts_of(studies, engine or []) if studies else (all_names, all_parts(engine or [], out))
+    names, parts = parts_of(studies, engine or [], out) if studies else (all_names, all_parts(engine or [], out))
     if only:
         names, parts = _of_groups(names, only), []
     if assigned and (parts or not studies):
@@ -116,7 +115,9 @@ def report(
     runner, chosen = options.new_runner(out, fresh, jobs, scheduler, workers), engine or []
     list_omitted_engines(loaded, chosen)
     total = len({part.key for part in parts}) + 2 * bool(loaded)
-    command = _command(studies or [], chosen, settings or [], budget, out, only, tolerance or [])
+    command = command_line(
+        "report", *(studies or []), engine=engine, set=settings, budget=budget, only=only, tolerance=tolerance, out=out
+    )
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
         growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out), runner)
         with growing.resumable(), runner.profile.phase("comparisons"):
@@ -258,28 +259,6 @@ def _of_groups(names: list[str], only: str) -> list[str]:
             raise InputError("--only", word, f"groups are {', '.join(dict.fromkeys(groups.values()))}")
         chosen |= matching
     return [name for name in names if name in chosen]
-
-
-def _command(
-    studies: list[str],
-    engines: list[str],
-    settings: list[str],
-    budget: float | None,
-    out: Path,
-    only: str | None,
-    tolerances: list[str],
-) -> str:
-    """Command that makes the report again."""
-    words = ["proofroll", "report", *studies]
-    for name in engines:
-        words += ["--engine", name]
-    for setting in settings:
-        words += ["--set", setting]
-    words += ["--budget", f"{budget:g}"] if budget else []
-    words += ["--only", only] if only else []
-    for text in tolerances:
-        words += ["--tolerance", text]
-    return shlex.join(words if out == Path("out") else [*words, "--out", str(out)])
 
 
 def _begin(number: int, total: int, words: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -97,7 +96,7 @@ def run(
 
     from proofroll.core.time_grid import EVERY, time_grid
     from proofroll.files.scene_file import scene_names
-    from proofroll.files.scene_sources import resolved
+    from proofroll.files.scene_sources import command_line, resolved
     from proofroll.files.trajectory_file import STORED
     from proofroll.report.run.run import run_content, run_lines
     from proofroll.report.terminal.screen import WIDTH
@@ -134,8 +133,8 @@ def run(
         for told in content.diagnosis:
             options.complain(f"{told.sentence}: {told.cause.remedy}")
     if as_json or done or content.final:
-        judged = _comparison(question, engine, settings, control, until) if engine != "truth" else ""
-        how = {"engine": case.engine.title, "checked": judged}
+        judged = command_line("compare", question, engine=engine, set=settings, control=control, until=until)
+        how = {"engine": case.engine.title, "checked": judged if engine != "truth" else ""}
         parts = partial(run_lines, content, **how, forces=forces, everything=everything)
         options.show(content, as_json, parts, widest=WIDTH)
     if not done or content.ends is not None:
@@ -156,18 +155,6 @@ def _preparing(engine: str, workers: Workers, *, forked: bool = False) -> Thread
     thread = Thread(target=prepare, args=(engine, workers), daemon=True)
     thread.start()
     return thread
-
-
-def _comparison(scene: str, engine: str, settings: list[str] | None, control: Path | None, until: float | None) -> str:
-    """Command that compares the same run with the truth."""
-    from proofroll.files.scene_sources import root_words
-
-    words = ["proofroll", "compare", scene, "--engine", engine]
-    for text in settings or ():
-        words += ["--set", text]
-    words += [*(["--control", str(control)] if control else []), *root_words()]
-    words += ["--until", f"{until:g}"] if until is not None else []
-    return shlex.join(words)
 
 
 def _show_matrices(scene: str, engine: str, settings: dict[str, str], as_json: bool) -> None:

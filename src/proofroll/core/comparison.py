@@ -167,6 +167,7 @@ class Comparison:
         timed: True if the speed of every run is measured, in clean runs of its own.
         order: rank in a report, the smallest first; those without come last, by name.
         brief: parameter -> values; a report without names has only the combinations that have one of them for each.
+        asked: name or path by which a command finds the file; empty: there is none.
         left_out: number of combinations left out of a report without names.
         budget: processor time that all cases may take together [s]; cases beyond it are left out; None: no limit.
         cut: True if the budget suffices for a shorter time than was asked for.
@@ -189,6 +190,7 @@ class Comparison:
     timed: bool = True
     order: float = math.inf
     brief: dict[str, list[float]] = field(default_factory=dict)
+    asked: str = ""
     left_out: int = 0
     budget: float | None = None
     cut: bool = False

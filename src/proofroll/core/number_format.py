@@ -1,6 +1,6 @@
 """Text of computed numbers for people: errors, costs, steps.
 
-Numbers that the user gave (parameters, lengths of runs) are written with ``:g`` instead.
+Numbers that the user gave (parameters, lengths of runs) are written with ``:g`` instead, in commands by :func:`exact`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,12 @@ def number(value: float | None, digits: int = 2, none: str = "–") -> str:
         return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(power)}"
     mantissa, exponent, power = f"{value:.{max(digits, 4)}g}".partition("e")  # 10 and 1200, not 1e1 and 1.2e3
     return f"{mantissa}e{int(power)}" if exponent else mantissa
+
+
+def exact(value: float) -> str:
+    """Text of a number that a person gave, which reads back as the same number: ``2``, ``0.123456789``."""
+    text = f"{value:g}"
+    return text if float(text) == value else repr(value)
 
 
 def error(value: float | None, digits: int = 2) -> str:

@@ -59,15 +59,22 @@ def time_grid(until: float, every: float) -> FloatArray:
 
 
 def require_whole_steps(times: FloatArray, step: float | None) -> None:
-    """Raises InputError if a fixed step does not divide the sampling intervals.
+    """Raises InputError if a fixed step does not divide the sampling intervals, all equal but for the last.
 
     Args:
         times: of the samples [s].
         step: fixed step [s]; None: the engine adapts its steps.
     """
-    if step is not None and len(times) > 1:
-        for start, end in (times[:2].tolist(), times[-2:].tolist()):  # all intervals but the last are equal
-            whole_steps(start, end, step)
+    if step is None or len(times) < 2:
+        return
+    (first, second), (start, end) = times[:2].tolist(), times[-2:].tolist()
+    whole_steps(first, second, step)
+    try:
+        whole_steps(start, end, step)
+    except InputError:
+        near = start + round((end - start) / step) * step
+        advice = f"no whole number of steps of {step:g} s leads there; end at {near:.9g} s"
+        raise InputError("until", end, advice) from None
 
 
 def off_grid(times: FloatArray, step: float | None) -> FloatArray:

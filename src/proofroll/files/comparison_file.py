@@ -18,6 +18,7 @@ from proofroll.core.validation import strict, validated
 from proofroll.core.verdict import Verdict
 from proofroll.files.data_folders import study_folders
 from proofroll.files.scene_file import SCENE_IS_A_FOLDER, load_scene, scene_names
+from proofroll.files.scene_sources import command_line
 from proofroll.files.toml import named_file, read_toml, study_of
 
 # Most combinations of parameters; a run takes about a second, so more are a mistake.
@@ -66,13 +67,10 @@ def load_comparison(name: str) -> Comparison:
     if "gravity" in content:
         raise InputError("comparison", name, SCENE_IS_A_FOLDER)
     if "study" in content:
-        raise InputError(f"{path}: study", content["study"], f"is no comparison; proofroll report {name} runs it")
-    return _comparison(path, content)
-
-
-def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
+        again = command_line("report", name)
+        raise InputError(f"{path}: study", content["study"], f"is no comparison; {again} runs it")
     with error_location(path.name):
-        return _checked(path, content)
+        return replace(_checked(path, content), asked=name)
 
 
 def _checked(path: Path, content: dict[str, Any]) -> Comparison:
@@ -83,7 +81,8 @@ def _checked(path: Path, content: dict[str, Any]) -> Comparison:
     if not isinstance(tables, list) or not tables:
         raise InputError(f"{place}: rows", tables, "give at least one engine; write [[rows]] before each")
     content["rows"] = [_prepared(f"{place}: rows.{index}", row) for index, row in enumerate(tables)]
-    program: dict[str, object] = {"left_out": 0, "budget": None, "spent": 0.0, "absent": {}}  # no file may have these
+    # No file may have these.
+    program: dict[str, object] = {"asked": "", "left_out": 0, "budget": None, "spent": 0.0, "absent": {}}
     comparison = validated(Comparison, content, place, name=path.stem, bands=bands, **program)
     for name, values in comparison.vary.items():
         if not values:
@@ -159,7 +158,11 @@ def _prepared(place: str, content: object) -> dict[str, Any]:
 
 def _checked_row(place: str, row: Row, comparison: Comparison, observables: Mapping[str, Observable]) -> Row:
     """A row with its bounds in the units of the scene, after checks that its types do not express."""
-    _check_engine(place, row)
+    try:
+        if (engine := parse_engine(row.engine).name) != "truth":
+            require_engine(engine)
+    except InputError as error:
+        raise error.within(f"{place}.engine", row.engine) from None
     require_known(f"{place}.tolerance", row.tolerance, comparison.bands)
     if row.ladder != [1.0]:
         _check_ladder(place, row.ladder)
@@ -180,15 +183,6 @@ def _checked_row(place: str, row: Row, comparison: Comparison, observables: Mapp
     if not comparison.combinations(row.only):
         raise InputError(f"{place}.only", row.only, "no point of the comparison fits, so the row would never be run")
     return replace(row, limit=limit, bound=bound)
-
-
-def _check_engine(place: str, row: Row) -> None:
-    try:
-        name = parse_engine(row.engine).name
-        if name != "truth":
-            require_engine(name)
-    except InputError as error:
-        raise error.within(f"{place}.engine", row.engine) from None
 
 
 def _check_expectations(place: str, row: Row) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -13,6 +14,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 from proofroll.core.engine_abilities import OwnOptions
 from proofroll.core.entry_points import loaded
 from proofroll.core.errors import InputError
+from proofroll.core.number_format import exact
 
 GROUP = "proofroll.scene_sources"
 # Entry points of functions of a path, such as ``own_options``, by the ending of their files without its dot.
@@ -65,6 +67,19 @@ class SceneSource(Protocol):
         Raises:
             InputError: the file with these parameters is no scene.
         """
+
+
+def command_line(*words: str, **options: object) -> str:
+    """Command of proofroll to be pasted: words, options with a value, a list or None, and the root of robot files.
+
+    The option ``--out`` is left out for the folder that is the usual one.
+    """
+    given: list[str] = []
+    for name, value in options.items():
+        values = value if isinstance(value, list) else [] if value in (None, "", Path("out")) else [value]
+        texts = (exact(item) if isinstance(item, float) else str(item) for item in values)
+        given += (word for text in texts for word in (f"--{name.replace('_', '-')}", text))
+    return shlex.join(["proofroll", *words, *given, *root_words()])
 
 
 def root_words() -> list[str]:

@@ -5,7 +5,6 @@ Kinds of parts are plug-ins, our own too: entry points of the group ``proofroll.
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -14,7 +13,7 @@ from typing import Any, ClassVar, Protocol
 
 from proofroll.core.entry_points import loaded
 from proofroll.core.errors import ProofrollError, require_known
-from proofroll.files.scene_sources import source_of
+from proofroll.files.scene_sources import command_line, source_of
 from proofroll.files.toml import named_file, read_toml, study_files
 from proofroll.report.pages import section_id
 from proofroll.running.runner import Runner
@@ -59,7 +58,9 @@ class Part(Protocol):
         key: name of its list in the content of a report.
         order: position among the parts of a report, the smallest first.
         words: name of the part, for a person.
-        command: arguments of ``proofroll`` that make it, with fields of ``asked`` as in ``stability {.scene}``.
+        command: words behind ``proofroll`` that make it, as ``paper regimes``.
+        named: name or path of the study, as a person gave it.
+        out: folder of its results.
         template: in the folder ``templates`` beside the class's module, with the macro
             ``section(entry, index, pictures, content)``.
         names: additional names for the template; they must differ from those of other parts.
@@ -76,6 +77,8 @@ class Part(Protocol):
     names: ClassVar[Mapping[str, Any]] = {}
     asked: Any
     engines: Sequence[str] = ()
+    named: str = ""
+    out: Path = Path("out")
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> Part:
@@ -93,8 +96,7 @@ class Part(Protocol):
     @property
     def head(self) -> dict[str, str]:
         """``name`` of the file, ``title``, ``question``, ``scene`` and the ``command`` that makes it."""
-        words = "".join(f" --engine {shlex.quote(name)}" for name in self.engines)
-        command = f"proofroll {self.command.format(self.asked)}{words}"
+        command = command_line(*self.command.split(), self.named, engine=[*self.engines], out=self.out)
         return {key: getattr(self.asked, key) for key in ("name", "title", "question", "scene")} | {"command": command}
 
     def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- for those that keep something
@@ -118,12 +120,20 @@ def part_kinds() -> tuple[type[Part], ...]:
     return tuple(sorted((kind for _, kind in loaded(GROUP, like=Part)), key=lambda kind: kind.order))
 
 
-def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], list[Part]]:
+def _loaded(kind: type[Part], path: Path, name: str, engines: Sequence[str], out: Path) -> Part:
+    """Part from a study's file, with the name or path of the study and the folder of its results."""
+    part = kind.load(path, engines)
+    part.named, part.out = name, out
+    return part
+
+
+def parts_of(names: Sequence[str], engines: Sequence[str], out: Path) -> tuple[list[str], list[Part]]:
     """Names of comparisons, and parts for the other names.
 
     Args:
         names: of comparisons, scenes and files for other studies, or paths, of robot files too.
         engines: engines that studies are restricted to.
+        out: folder of results.
 
     Raises:
         InputError: a file is broken, or asks for something that is no part of a report.
@@ -138,13 +148,14 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
             comparisons.append(name)
         else:
             require_known(f"{name}: study", str(study), kinds, "a report has comparisons and")
-            parts.append(kinds[study].load(path, engines))
+            parts.append(_loaded(kinds[study], path, name, engines, out))
     return comparisons, sorted(parts, key=lambda part: part.order)
 
 
 def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
     """Parts of all studies' files in the order of a report; those on request only if ``out`` has their results."""
-    parts = [kind.load(path, engines) for kind in part_kinds() for path, _ in study_files(kind.kind)]
+    files = ((kind, path) for kind in part_kinds() for path, _ in study_files(kind.kind))
+    parts = [_loaded(kind, path, path.stem, engines, out) for kind, path in files]
     return [part for part in parts if not part.on_request or part.keeps(out)]
 
 

@@ -70,7 +70,7 @@ def test_a_step_that_is_not_confirmed_is_no_line_to_change() -> None:
         bound=BOUND, error=1.0, status="done", message="", reached=5.0, held_until=0.1, seconds_per_second=1 / 160,
         advised=advised, spent=1.0, measured=Measured("2026", {}, {}, ""),
     )  # fmt: skip
-    command = "proofroll recommend pendulum --engine mujoco --tolerance '1 mm' --until 5.0 --lines"
+    command = "proofroll recommend pendulum --lines --engine mujoco --tolerance '1 mm' --until 5.0"
     assert _change(made) == [f"Lines that do, if any: {command}"]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.core.time_grid import sampling_interval, time_grid
+from proofroll.core.time_grid import require_whole_steps, sampling_interval, time_grid
 
 
 @pytest.mark.parametrize(
@@ -39,6 +39,14 @@ def test_what_is_no_time(given: Any) -> None:
 def test_sampling_interval(step: float | None, every: float) -> None:
     """Where nobody says how often to sample it is about every 0.01 s, at ends of steps."""
     assert sampling_interval(step) == pytest.approx(every)
+
+
+def test_an_end_off_the_steps_names_one_that_is_on_them() -> None:
+    """Where only the last interval has no whole number of steps, the line says where to end instead."""
+    with pytest.raises(InputError, match=r"end at 0\.123 s") as caught:
+        require_whole_steps(time_grid(0.1234567, 0.01), 1e-3)
+    assert (caught.value.field, caught.value.value) == ("until", 0.1234567)
+    require_whole_steps(time_grid(0.123, 0.01), 1e-3)
 
 
 def test_time_grid_ends_exactly() -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterator
 
 from proofroll.core.number_format import number
 from proofroll.core.plugins import parse_engine
-from proofroll.files.scene_sources import root_words
+from proofroll.files.scene_sources import command_line
 from proofroll.report.labels import INSTALLED, engine_title, engine_words, step, symbol
 from proofroll.report.labels import unit as shown_unit
 from proofroll.report.run.last_values import FORCES
@@ -244,25 +243,23 @@ def answer_lines(made: SceneAnswer) -> Iterator[str]:
 
 def command_of(made: SceneAnswer, item: EngineAnswer) -> str:
     """Command that asks whether a setting holds the tolerance, with all that the answer was given."""
-    return shlex.join(["proofroll", "compare", made.scene, "--engine", item.spec, *_given(made)])
+    return command_line("compare", made.scene, engine=item.spec, **_given(made))
 
 
 def plot_command(made: SceneAnswer) -> str:
     """Command that draws error against cost, with all that the answer was given."""
-    return shlex.join(["proofroll", "recommend", made.scene, *_given(made), "--plot", "cost.svg"])
+    return command_line("recommend", made.scene, **_given(made), plot="cost.svg")
 
 
 def lines_command(made: StepAnswer, engine: str) -> str:
     """Command that prints the lines of an engine's own model that hold the tolerance of an answer."""
-    return shlex.join(["proofroll", "recommend", made.scene, "--engine", engine, *_given(made), "--lines"])
+    return command_line("recommend", made.scene, "--lines", engine=engine, **_given(made))
 
 
-def _given(made: SceneAnswer | StepAnswer) -> list[str]:
-    """Words of a command that ask the question of an answer."""
-    words = ["--tolerance", made.tolerance]
-    for name, value in made.parameters.items():
-        words += ["--set", f"{name}={value!r}"]
-    return [*words, "--until", f"{made.until!r}", *root_words()]
+def _given(made: SceneAnswer | StepAnswer) -> dict[str, object]:
+    """Options of a command that ask the question of an answer."""
+    parameters = [f"{name}={value!r}" for name, value in made.parameters.items()]
+    return {"tolerance": made.tolerance.split(", "), "set": parameters, "until": repr(made.until)}
 
 
 def step_sentence(made: StepAnswer) -> str:

@@ -155,6 +155,7 @@ class ReportedComparison:
     """Content of a comparison: ``rows`` summarise each engine with settings, ``runs`` have all details of each run.
 
     Attributes:
+        asked: name or path by which a command finds its file; empty: it has none.
         group: of its scene (:func:`proofroll.report.kinds.group_of`).
         shown_by: name of the kind of element that adds to its report.
         requires: capabilities that its scene requires of a formulation, sorted.
@@ -167,6 +168,7 @@ class ReportedComparison:
     """
 
     name: str
+    asked: str
     title: str
     question: str
     scene: str

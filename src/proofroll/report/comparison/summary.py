@@ -52,6 +52,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
     rows, runs = reported(outcome)
     return ReportedComparison(
         name=comparison.name,
+        asked=comparison.asked,
         title=comparison.title,
         question=comparison.question,
         scene=comparison.scene,

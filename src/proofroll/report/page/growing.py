@@ -117,7 +117,10 @@ class Report:
         if entry.study is not None:
             alike = [id(rival) for rival in self.parts if rival.key == part.key]
             prefix = f"{part.key}{alike.index(id(part))}-"
-            self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
+            try:
+                self.pictures |= {f"{prefix}{name}": markup for name, markup in part.pictures(prefix).items()}
+            except ProofrollError as error:  # the reason, in place of pictures
+                self.pictures[f"{prefix}problem"] = str(error)
 
 
 def begun(outcomes: list[Outcome], command: str, awaited: Sequence[str] = (), left_out: Sequence[str] = ()) -> Report:
@@ -142,11 +145,3 @@ def _replay(outcomes: list[Outcome], engines: Sequence[str]) -> Replay | None:
     drawn_by = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
     drawn = {kind: [item for item in outcomes if kinds[id(item)] is kind] for kind in drawn_by}
     return joined([replay_content(of_kind, kind.replay(), engines) for kind, of_kind in drawn.items()])
-
-
-def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:
-    """Pictures by prefix and name; if they cannot be drawn, a sentence with the reason under ``problem``."""
-    try:
-        return {f"{prefix}{name}": markup for name, markup in draw().items()}
-    except ProofrollError as error:
-        return {f"{prefix}problem": str(error)}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from proofroll.core import number_format
 from proofroll.files.json_data import plain
-from proofroll.files.scene_sources import root_words
+from proofroll.files.scene_sources import command_line
 from proofroll.report import labels
 from proofroll.report.answer import picture, sentences
 from proofroll.report.comparison import tables, verdict_matrix
@@ -109,6 +109,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "settings": labels.settings_text,
         "name_of": labels.name_of,
         "plain": plain,
+        "quoted": shlex.quote,
     }
     made.globals |= {
         "tables": tables,
@@ -144,7 +145,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
 
 def _again(comparison: ReportedComparison, run: ReportedRun) -> str:
     """Command that repeats one run."""
-    words = ["proofroll", "run", comparison.scene, "--engine", run.engine]
-    for name, value in run.parameters.items():
-        words += ["--set", f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"]
-    return shlex.join([*words, "--until", f"{comparison.until:g}", "--every", f"{comparison.every:g}", *root_words()])
+    values = run.parameters.items()
+    settings = [f"{name}={number_format.exact(item) if isinstance(item, float) else item}" for name, item in values]
+    times = {"until": comparison.until, "every": comparison.every}
+    return command_line("run", comparison.scene, engine=run.engine, set=settings, **times)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -9,7 +10,9 @@ from typing import Any
 
 from proofroll.core.engine_abilities import TellsLines
 from proofroll.core.errors import ProofrollError
+from proofroll.core.number_format import exact
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
+from proofroll.files.scene_sources import ROOT, root_words
 from proofroll.report.answer.sentences import command_of
 from proofroll.report.pages import slug
 from proofroll.studies.answer.records import EngineAnswer, SceneAnswer
@@ -27,14 +30,18 @@ def of(made: SceneAnswer, item: EngineAnswer) -> ModelLines:
     """Lines for an engine that holds a tolerance, for the answer's question: its own, a command, and a test."""
     lines, note = _own(item.spec)
     given = ", ".join(f"{name}={value!r}" for name, value in made.parameters.items())
-    scene = f'load_scene("{made.scene}", {given})' if given else f'"{made.scene}"'
+    name, below = json.dumps(made.scene), root_words()[1:]
+    scene = f"load_scene({name}, {given})" if given else name
     bounds = {bound.quantity: f"{bound.allowed:.12g} {bound.unit}".removesuffix(" 1") for bound in made.bounds}
-    arguments = [scene, f'"{item.spec}"', f"tolerance={bounds!r}", f'because="{made.tolerance} is close enough"']
+    why = f"{made.tolerance} is close enough"
+    arguments = [scene, f'"{item.spec}"', f"tolerance={bounds!r}", f"because={json.dumps(why)}"]
+    arguments += [f"until={exact(made.until)}", f"every={exact(made.every)}"]
     test = [
         *(["from proofroll import load_scene", "", ""] if given else []),
-        f"def test_{slug(made.scene).replace('-', '_')}(assert_agrees):",
+        f"def test_{slug(made.scene).replace('-', '_')}(assert_agrees{', monkeypatch' if below else ''}):",
+        *(f'    monkeypatch.setenv("{ROOT}", {json.dumps(folder)})' for folder in below),
         "    assert_agrees(",
-        *(f"        {argument}," for argument in [*arguments, f"until={made.until:g}", f"every={made.every:g}"]),
+        *(f"        {argument}," for argument in arguments),
         "    )",
     ]
     own = {"In your model": "\n".join(lines)} if lines else {}

@@ -39,7 +39,7 @@ class StabilityPart(Part):
     key: ClassVar[str] = "stability"
     order: ClassVar[float] = 40
     words: ClassVar[str] = "where engines stop being right"
-    command: ClassVar[str] = "stability {.scene}"
+    command: ClassVar[str] = "stability"
     template: ClassVar[str] = "stability.html"
     names: ClassVar[Mapping[str, Any]] = {"stability_map": stability_map}
     asked: StabilityFile

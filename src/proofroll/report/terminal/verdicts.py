@@ -84,7 +84,8 @@ def verdict_parts(
     yield from _presets_lines({row.preset for row, _ in listed})
     yield ""
     yield f"  {'setting':{_SETTING}}{'worst error of allowed':{_ERROR}}{'real time':>{_SPEED}}"
-    for row, runs in sorted(listed, key=lambda pair: _rank(pair[0])):
+    ranks = {id(row): (row.witness, SEVERITY.index(verdict_of(row)), _cost(row) or math.inf) for row, _ in listed}
+    for row, runs in sorted(listed, key=lambda pair: ranks[id(pair[0])]):
         yield from row_lines(row, runs, [item for item, _ in listed], orders=orders)
     for item in content.spread:
         yield from ("", *spread_parts(item))
@@ -100,11 +101,6 @@ def _presets_lines(presets: set[str | None]) -> Iterator[str]:
     if documented := " and ".join(name for name in ("matched", "tuned") if name in presets):
         clauses.append(f"{documented}: documented options; an answer's best: the cheaper of matched, tuned")
     yield from [f"{'; '.join(clauses)}."] if clauses else []
-
-
-def _rank(row: ReportedRow) -> tuple[bool, int, float]:
-    """Sort key of a row: engines first, by verdict, then the cheapest."""
-    return row.witness, SEVERITY.index(verdict_of(row)), _cost(row) or math.inf
 
 
 def verdict_of(row: ReportedRow) -> Verdict:

@@ -12,7 +12,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.robots.files.mjcf.parse import with_classes
 from proofroll.robots.files.robot_file import LintRemark, RobotFile, floats, numbers
 from proofroll.robots.hypotheses.inertias import incomplete_inertias
-from proofroll.robots.model import Robot, RobotBody
+from proofroll.robots.model import Robot
 
 # Level, where and what of a :class:`LintRemark`.
 _Noticed = tuple[str, str, str]
@@ -174,20 +174,16 @@ def implausible(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]
     noun = "link" if file.kind == "urdf" else "body"
     between = sum(float(np.linalg.norm(joint.position)) for joint in robot.joints if joint.kind != JointKind.FREE)
     for name, body in robot.bodies.items():
-        for what in _doubtful(body, between):
-            yield "warning", f"{noun} {name}", what
+        if body.mass > 0:
+            doubts = [*doubtful_body(body.mass, body.com, float(body.moments[-1]), between)]
+            massive = f"it has a mass of {body.mass:.4g} kg but no inertia: some engines refuse it, others invent one"
+            for what in doubts if np.any(body.inertia) else [*doubts, massive]:
+                yield "warning", f"{noun} {name}", what
     for joint in robot.joints:
         away = float(np.linalg.norm(joint.position))
         if away > LARGE and joint.kind != JointKind.FREE:
             yield "warning", f"joint {joint.name}", f"it lies {away:.4g} m from its parent's origin; lengths are metres"
     yield from (_urdf_angles(file, robot) if file.kind == "urdf" else _mjcf_joints(file))
-
-
-def _doubtful(body: RobotBody, between: float) -> Iterator[str]:
-    if body.mass > 0:
-        yield from doubtful_body(body.mass, body.com, float(body.moments[-1]), between)
-        if not np.any(body.inertia):
-            yield f"it has a mass of {body.mass:.4g} kg but no inertia: some engines refuse it, others invent one"
 
 
 def _urdf_angles(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]:

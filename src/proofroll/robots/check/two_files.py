@@ -19,7 +19,7 @@ from proofroll.robots.check.check import bar_of, robot_drawing
 from proofroll.robots.check.importer_row import importer_row
 from proofroll.robots.check.layers import LAYERS, RobotTruth
 from proofroll.robots.check.lint import lint
-from proofroll.robots.check.records import AgainstCheck, ImporterRow, UnlikeValue, UsedTruth
+from proofroll.robots.check.records import AgainstCheck, UnlikeValue, UsedTruth
 from proofroll.robots.check.two_formulations import passive
 from proofroll.robots.files import reading
 from proofroll.robots.files.meaning import USUAL, CheckSettings, moving_robot, source_of
@@ -171,14 +171,19 @@ def against(
     unlike = list(_unlike(robot, renamed))
     rounded = [value for value in unlike if _same_digits(value.here, value.there)]
     proposed, partners = proposed_patterns(robot, other_robot, matched)
+    # Remedies and known engines are about engines and not about files.
+    causes = ([dataclasses.replace(cause, remedy="", known="") for cause in row.causes] for row in rows)
+    of_files = [dataclasses.replace(row, causes=item) for row, item in zip(rows, causes, strict=True)]
+    remarks = _lint(second, other_robot)
+    further = (dataclasses.replace(item, where=f"{rival.name}: {item.where}") for item in remarks)
     return AgainstCheck(
         file=str(path),
         kind=file.kind,
         base=settings.base if "urdf" in {file.kind, second.kind} else "as in the file",
-        lint=[*_lint(file, robot), *(_of_file(rival, remark) for remark in _lint(second, other_robot))],
+        lint=[*_lint(file, robot), *further],
         truth=UsedTruth(by=by, difference=bar, states=settings.states, seed=settings.seed, velocities=robot.dofs),
         layers=LAYERS,
-        engines=[_as_file(row) for row in rows],
+        engines=of_files,
         robot=robot_drawing(truth),
         against=str(rival),
         against_by=by_other,
@@ -203,17 +208,8 @@ def _lint(file: RobotFile, robot: Robot) -> list[LintRemark]:
     return [*file.remarks, *lint(file, robot)]
 
 
-def _of_file(path: Path, remark: LintRemark) -> LintRemark:
-    return dataclasses.replace(remark, where=f"{path.name}: {remark.where}")
-
-
 def _answer(robot: Robot, truth: RobotTruth) -> reading.ReaderAnswer:
     return reading.ReaderAnswer(version="", says="", tolerances={}, reading=reading_of(robot, truth), refused="")
-
-
-def _as_file(row: ImporterRow) -> ImporterRow:
-    """The row without remedies and known engines, which are about engines and not about files."""
-    return dataclasses.replace(row, causes=[dataclasses.replace(cause, remedy="", known="") for cause in row.causes])
 
 
 def _matched(robot: Robot, rival: Robot, names: Mapping[str, str]) -> dict[str, str]:

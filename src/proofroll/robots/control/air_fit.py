@@ -40,6 +40,9 @@ _STILL = 0.01  # part of the change of velocity in a step up to which a joint st
 _ROWS = 5  # rows whose accelerations are computed
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEW = 150  # equations by which a scheme that is rare is looked at first
+_UNKNOWN = 3.0  # times what half an interval makes that steps between rows may make: efforts jump at instants
+_HALF = 0.5  # part of what the right numbers leave that several together may leave
+_BOUND = 0.05  # part of the rows at which friction is at its bound, at least
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
 
 
@@ -65,6 +68,7 @@ class AirFit:
             more as well.
         tried: number of numbers and bodies that were tried.
         between: True if more than rounding is left, which no cause explains and steps between the rows may.
+        softened: True if dry friction that stays within its bound explains it, as that of MuJoCo below its bound does.
     """
 
     off: float
@@ -74,6 +78,7 @@ class AirFit:
     imitated: bool = False
     tried: int = 0
     between: bool = False
+    softened: bool = False
 
     @property
     def left(self) -> float:
@@ -156,7 +161,8 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
     scheme, best, _ = min(trials, key=lambda trial: trial.rows.off / trial.rows.size)
     scale = 1 / best.size
     if best.exact:
-        armed = [item for item in trials if not item.scheme.implicit and _fits(item.rows, "implicit")]
+        explicit = [item.rows for item in trials if not item.scheme.implicit]
+        armed = [item for item in explicit if rms(item.left - item.columns["implicit"]) <= SAFETY * item.rounding]
         imitated = scheme.implicit and bool(armed)
         damped = scheme.damped and bool(robot.damping.any())
         return AirFit(best.off * scale, SAFETY * best.rounding * scale, damped=damped, imitated=imitated)
@@ -173,16 +179,33 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
     if together and not closed:
         likely = [rows for item, rows, hopeful in trials if hopeful and not item.stages]
         sets = [several_causes(rows, law.joints, right_numbers(law)) for rows in likely]
-        named = min(filter(None, sets), key=len, default=named)
+        halving = [found for found in sets if found and found[0].after <= _HALF * right.after]
+        named = min(halving, key=len, default=named)
     # The steps of the program may be no rows.
-    between = not named and bar < best.off <= min(item.rows.unknown for item in trials)
+    between = not named and bar < best.off <= _UNKNOWN * min(item.rows.unknown for item in trials)
     tried = len(NUMBERS) + len(best.added)
-    return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between)
+    softened = not named and any(_softened(item.rows, law, robot) for item in trials)
+    return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between, softened=softened)
 
 
-def _fits(rows: AirRows, name: str) -> bool:
-    """True if a number of 1 leaves no more than rounding."""
-    return rms(rows.left - rows.columns[name]) <= SAFETY * rows.rounding
+def _softened(rows: AirRows, law: ControlLaw, robot: AirRobot) -> bool:
+    """True if dry friction within its bounds, and at them at some rows, leaves no more than rounding.
+
+    MuJoCo's friction is a soft row: below its bound it is a force by the velocity and the acceleration of its joint.
+    """
+    bounds = {joint.name: joint.friction for joint in robot.mechanism.joints}
+    friction = np.array([bounds[name] for name in law.joints])
+    rubbing = friction > 0
+    if not rubbing.any():
+        return False
+    rows = rows.without(rows.slow) if rows.slow.any() and not rows.slow.all() else rows
+    columns = rows.by_joint["friction"][:, rubbing].reshape(-1, rows.freedoms, np.count_nonzero(rubbing))
+    more = np.einsum("rij,rj->ri", np.linalg.pinv(columns), rows.left.reshape(-1, rows.freedoms))
+    sizes = np.linalg.norm(columns, axis=1)
+    near = SAFETY * rows.rounding / sizes[sizes > 0].min() + ROUND_OFF
+    within = np.all((more <= near) & (more >= -2 * friction[rubbing] - near))
+    left = rows.left - np.einsum("rij,rj->ri", columns, more).ravel()
+    return bool(within and rows.rounded(left) and np.mean(np.abs(more) <= near) >= _BOUND)
 
 
 def _causes(rows: AirRows, law: ControlLaw) -> list[LayerCause]:

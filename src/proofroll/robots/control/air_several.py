@@ -30,7 +30,7 @@ from proofroll.robots.control.air_rows import (
 )
 from proofroll.robots.control.bookkeeping.air import AirRobot, HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
-from proofroll.robots.control.differences import efforts_of, instant_rows
+from proofroll.robots.control.differences import efforts_of
 from proofroll.robots.control.record import BASE, FITTED, ControlRecord, Layer, LayerCause
 from proofroll.robots.model import Array
 
@@ -46,6 +46,11 @@ _CHANCE, _BARS = 1e-3, 3.0  # chance of a number that is told and is not there; 
 _EACH = 2  # equations for each number at least
 _SPREAD = 5.0  # standard deviations of a sum of squares within which numbers leave as little as all of them do
 _CLEAR, _SHARE = 10.0, 0.03  # least part of a number's forces that no others make: what is left of less is their noise
+_STRETCH, _TO_AND_FRO = 60, -0.25  # rows that show noise at least; correlation of its steps with the next ones at most
+_MEDIAN, _LARGEST = (
+    0.455,
+    6.0,
+)  # median of the square of a normal number; standard deviations of the largest of thousands
 _REST = "torque"  # number of a joint that a spring needs, too: its rest is not known
 
 
@@ -82,6 +87,12 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         if columns.shape[1] > _OF_A_POINT and carried is None and (carried := _carried(rows)):
             return carried
         values, remainder = _solved(columns, rows.left)
+        places = np.cumsum([0, *(group.columns.shape[1] for group in chosen)])
+        scales = [values[place] for group, place in zip(chosen, places, strict=False) if group.kind == "effort"]
+        if any(
+            abs(scale + 1) <= ROUND_OFF for scale in scales
+        ):  # without efforts, masses of nothing explain any motion
+            continue
         if columns.shape[1] <= _MOST * len(rows.left) and rms(remainder) <= SAFETY * rows.rounding:
             return [*_told(rows, chosen, columns, values, right)]
     return []
@@ -242,7 +253,6 @@ class WhiteNoise(NamedTuple):
     clause: str  # on it
     smooth: Callable[[Array], Array]
     width: int  # rows that are smoothed together
-    kept: float  # part of a variance that smoothing leaves
 
 
 def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: str) -> Layer | None:
@@ -298,20 +308,6 @@ def commanded_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot) -> 
     return noisy_layer(record, law, held, clause) or Layer("acceleration", reason=absent)
 
 
-def noisy_efforts(record: ControlRecord, law: ControlLaw) -> Layer | None:
-    """Layer of efforts that the law gives but for white noise of states and efforts; None: more than that is left."""
-    recorded, efforts, white = record.stacked("effort", law.joints), efforts_of(record, law), white_noise(record)
-    if recorded is None or isinstance(efforts, str) or white is None:
-        return None
-    off = (recorded - efforts)[instant_rows(record, law) if law.hold_effort else np.isfinite(efforts).all(axis=1)]
-    level = np.diff(off, _DEGREE, axis=0).std(axis=0) * math.sqrt(white.kept / _OF_DIFFERENCES)
-    left = white.smooth(off)[white.width : -white.width : white.width]
-    if not len(left) or not np.all(np.sqrt(np.mean(left**2, axis=0)) <= level * (1 + _WHITE / math.sqrt(len(left)))):
-        return None
-    reason = f"efforts are off by {error(float(np.abs(off).max()))}; {white.clause}, and no more is left"
-    return Layer("effort", reason=reason, undecided=True, noise=white.part)
-
-
 @lru_cache(maxsize=4)
 def white_noise(record: ControlRecord, *, efforts: bool = True) -> WhiteNoise | None:
     """White noise of states, and of efforts if asked; None: they have other noise, or none.
@@ -341,8 +337,53 @@ def white_noise(record: ControlRecord, *, efforts: bool = True) -> WhiteNoise | 
             smoothed = replace(record, columns={**record.columns, **curves})
             part = float((noise / ranges).max())
             words = f"white noise of up to {error(100 * part, 1)} % of a range, smoothed over {width} rows, explains it"
-            return WhiteNoise(record=smoothed, part=part, clause=words, smooth=smooth, width=width, kept=kept)
+            return WhiteNoise(record=smoothed, part=part, clause=words, smooth=smooth, width=width)
     return None
+
+
+class StateNoise(NamedTuple):
+    """White noise of the states of a record: the record with it as its rounding, and the largest part of a range."""
+
+    record: ControlRecord
+    part: float
+
+    @property
+    def words(self) -> str:
+        """Clause on it."""
+        return f"white noise of {error(100 * self.part, 1)} % of a range"
+
+
+@lru_cache(maxsize=4)
+def noise_of_states(record: ControlRecord) -> StateNoise | None:
+    """White noise of a record whose places have it; None: those of no joint have.
+
+    Places then go to and fro about the integral of the velocities, from each row to the next.
+    """
+    h, noisy = np.diff(record.time), False
+    for name, places in record.columns.items():
+        velocities = record.columns.get(f"v.{name[2:]}")
+        if name.startswith("q.") and velocities is not None and len(h) > _STRETCH:
+            off = np.diff(places) - h * (velocities[1:] + velocities[:-1]) / 2
+            off = off - off.mean()
+            square, rounding = float(off @ off) or 1.0, 2 * record.rounding[name].max()
+            next_one, one_after = (float(off[k:] @ off[:-k]) / square for k in (1, 2))
+            noisy |= square > len(off) * rounding**2 and next_one < _TO_AND_FRO and abs(one_after) < -_TO_AND_FRO
+    if not noisy:
+        return None
+    kinds = ("q.", "v.", *(f"{name}." for name in BASE))
+    columns = {name: item for name, item in record.columns.items() if name.startswith(kinds) and np.ptp(item) > 0}
+    squares = {name: np.mean(np.diff(item, _DEGREE) ** 2) / _OF_DIFFERENCES for name, item in columns.items()}
+    bars = {name: np.maximum(record.rounding[name], math.sqrt(3 * square)) for name, square in squares.items()}
+    part = max(math.sqrt(square) / float(np.ptp(columns[name])) for name, square in squares.items())
+    return StateNoise(replace(record, rounding={**record.rounding, **bars}), part)
+
+
+def noise_beside(curves: Array) -> Array:
+    """Largest noise of each column (times, n) beside curves that may jump at some times."""
+    if len(curves) <= _DEGREE:
+        return np.zeros(curves.shape[1])
+    median = np.median(np.diff(curves, _DEGREE, axis=0) ** 2, axis=0)
+    return np.asarray(_LARGEST * np.sqrt(median / (_MEDIAN * _OF_DIFFERENCES)))
 
 
 def _in_noise(rows: AirRows, remainder: Array, count: int) -> AirRows:

@@ -328,7 +328,8 @@ def _of_joint_columns() -> Iterator[ColumnMistake]:
     yield ColumnMistake("degrees", rates, partial(_scaled, "v.", _DEGREE))
     yield ColumnMistake("sign", "v.JOINT has the other sign", partial(_scaled, "v.", -1.0))
     yield ColumnMistake("sign", "q.JOINT has the other sign", partial(_scaled, "q.", -1.0))
-    yield ColumnMistake("milliseconds", "the times are in milliseconds: name them time[ms]", _in_seconds)
+    words = "the times are in milliseconds: name them time[ms]"
+    yield ColumnMistake("milliseconds", words, lambda record: replace(record, time=_MILLI * record.time))
 
 
 def _of_spins() -> Iterator[ColumnMistake]:
@@ -435,10 +436,6 @@ def _moved(start: str | tuple[str, ...], rows: int, record: ControlRecord) -> Co
     part = record.part(kept)
     moved = {name: item[kept + rows] for name, item in record.columns.items() if name.startswith(start)}
     return replace(part, columns={**part.columns, **moved})
-
-
-def _in_seconds(record: ControlRecord) -> ControlRecord:
-    return replace(record, time=_MILLI * record.time)
 
 
 def _after(*changes: Changed) -> Changed:

@@ -301,3 +301,15 @@ DIFFERENCES: Mapping[str, Callable[[ControlRecord, ControlLaw], LayerDifferences
     "target": _target,
     "effort": _effort,
 }
+
+
+def rows_are_steps(record: ControlRecord, law: ControlLaw) -> bool:
+    """True if places move by the velocity after each row and not by that before, as in steps of semi-implicit Euler."""
+    q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
+    if q is None or v is None:
+        return False
+    h = np.diff(record.time)[:, None]
+    rounding = 2 * record.rounding_of("q", law.joints)[1:] + h * record.rounding_of("v", law.joints)[1:]
+    bars = rounding + ROUND_OFF * np.abs(q).max()
+    moved = np.diff(q, axis=0)
+    return bool(np.all(np.abs(moved - h * v[1:]) <= bars) and np.any(np.abs(moved - h * v[:-1]) > 2 * bars))

@@ -263,10 +263,12 @@ def _best_reading(
         """
         for rival in itertools.takewhile(lambda _: not time.over, rivals):
             layers = layers_of(rival, SearchTime(0.0))
-            same = _OF_JOINTS if _differs_in_base(rival.record, plain[0].record) else set[str]()
+            others = {name: item for name, item in rival.record.columns.items() if name[:4] not in _BASE}
+            alike = all(plain[0].record.columns.get(name) is item for name, item in others.items())
+            same = _OF_JOINTS if alike else set[str]()
             if not _open_layers(layers) & ({"acceleration"} | (_open_layers(plain[1]) & same)):
                 layers = layers_of(rival, time)
-            if _open_layers(plain[1]) <= _looked_at(layers):
+            if _open_layers(plain[1]) <= {item.name for item in layers if item.residual is not None or item.undecided}:
                 silent.append((rival, layers))
 
     if any(_open(plain)):
@@ -286,11 +288,6 @@ def _best_reading(
         silent.extend(item for item in trials if id(item[0]) not in by_state)
         judged = [*(item for item in trials if id(item[0]) in by_state), *judged]
     return best()
-
-
-def _differs_in_base(record: ControlRecord, rival: ControlRecord) -> bool:
-    """True if two records have the same columns but for those of the base."""
-    return all(rival.columns.get(name) is item for name, item in record.columns.items() if name[:4] not in _BASE)
 
 
 def _of_importers(
@@ -354,10 +351,6 @@ def _open_layers(layers: Sequence[Layer]) -> set[str]:
         for layer in layers
         if (layer.undecided and not layer.noise if layer.residual is None else not (layer.holds or layer.causes))
     }
-
-
-def _looked_at(layers: Sequence[Layer]) -> set[str]:
-    return {layer.name for layer in layers if layer.residual is not None or layer.undecided}
 
 
 def _refuse_refs(control: Path, refs: Mapping[str, float]) -> None:

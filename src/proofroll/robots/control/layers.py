@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from proofroll.core.number_format import counted, error
 from proofroll.elements.mechanism import Mechanism
 from proofroll.robots.control.air_fit import AirFit, StandingFit, acceleration_fit, standing_fit
-from proofroll.robots.control.air_several import commanded_layer, noisy_efforts, noisy_layer, white_noise
+from proofroll.robots.control.air_several import (
+    commanded_layer,
+    noise_beside,
+    noise_of_states,
+    noisy_layer,
+    white_noise,
+)
 from proofroll.robots.control.bookkeeping.air import HeldRobot
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import (
@@ -50,6 +56,7 @@ from proofroll.robots.control.differences import (
     efforts_of,
     held_rows,
     instant_rows,
+    rows_are_steps,
     servo_rows,
     sources,
     targets_of,
@@ -61,6 +68,7 @@ from proofroll.robots.model import Array
 
 # Remark on a scheme that has the damping of joints at the velocity after a step.
 _DAMPED = "damping of joints acts at the velocity after the step, or they have an armature of h times it more"
+_SOFTENED = "dry friction within its bounds explains it, as that of MuJoCo, which is soft: no other cause is decided"
 # Number of random roundings of a record that give the bar of a layer, and the factor on their largest change.
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
@@ -191,8 +199,12 @@ def _layer(name: str, evidence: _Evidence, skipped: Collection[str], time: Searc
         column=compared.columns[column],
         time=float(compared.time[row]),
     )
-    if name == "effort" and not layer.holds and (noisy := noisy_efforts(evidence.record, evidence.law)) is not None:
-        return noisy
+    noise = None if layer.holds or name == "instants" else noise_of_states(evidence.record)
+    if noise is not None:
+        noisy = _bars(name, dataclasses.replace(evidence, record=noise.record), compared)
+        if np.all(np.abs(compared.difference) <= noisy + noise_beside(compared.difference)):
+            reason = f"off by {error(float(np.abs(compared.difference).max()))}, which {noise.words} may make"
+            return Layer(name, reason=reason, undecided=True, noise=noise.part)
     causes = {} if layer.holds else _explained(name, compared, bars, skipped, evidence, time)
     return dataclasses.replace(layer, **causes)
 
@@ -213,12 +225,17 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     floats, off = "q_WB.w" in record.columns, f"the forces are off by {error(fit.off)} of the largest"
     looked_at = fit.off > fit.bar and (floats or not fit.causes)
     white = white_noise(record, efforts=not floats) if looked_at else None
-    if white is not None and not floats and (noisy := noisy_layer(record, law, evidence.in_air.held, off)) is not None:
-        return noisy
+    smoothed = noisy_layer(record, law, evidence.in_air.held, off) if white is not None and not floats else None
+    noise = noise_of_states(record) if looked_at and white is None else None
+    if smoothed is None and (fit.softened or noise is not None):
+        why, part = (_SOFTENED, 0.0) if noise is None else (f"{noise.words} may hide a cause", noise.part)
+        smoothed = Layer("acceleration", reason=f"{off}; {why}", undecided=True, noise=part)
+    if smoothed is not None:
+        return smoothed
     if fit.off > fit.bar and not (white and floats) and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
-    fit = dataclasses.replace(fit, between=fit.between and not (stepwise or _rows_are_steps(record, law)))
+    fit = dataclasses.replace(fit, between=fit.between and not (stepwise or rows_are_steps(record, law)))
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
     hidden = white if floats or not fit.causes else None
@@ -244,18 +261,6 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
         causes=fit.causes,
         tried=0 if earlier else fit.tried,
     )
-
-
-def _rows_are_steps(record: ControlRecord, law: ControlLaw) -> bool:
-    """True if places move by the velocity after each row and not by that before, as in steps of semi-implicit Euler."""
-    q, v = record.stacked("q", law.joints), record.stacked("v", law.joints)
-    if q is None or v is None:
-        return False
-    h = np.diff(record.time)[:, None]
-    rounding = 2 * record.rounding_of("q", law.joints)[1:] + h * record.rounding_of("v", law.joints)[1:]
-    bars = rounding + ROUND_OFF * np.abs(q).max()
-    moved = np.diff(q, axis=0)
-    return bool(np.all(np.abs(moved - h * v[1:]) <= bars) and np.any(np.abs(moved - h * v[:-1]) > 2 * bars))
 
 
 def _of_another_robot(
@@ -351,14 +356,8 @@ def _explained(
         together = _together(name, candidates, evidence, bars, time)
         causes = causes if together is None else [together]
     closing = [cause for cause in causes if cause.after <= rounding]
-    causes = closing or [_with_rest(cause, cause.after / distance) for cause in causes]
+    causes = closing or [cause.with_rest(cause.after / distance) for cause in causes]
     return {"causes": tuple(causes), "tried": tried, "known": len(candidates)}
-
-
-def _with_rest(cause: LayerCause, part: float) -> LayerCause:
-    """A cause that says which part of the difference it leaves."""
-    rest = f"{cause.sentence}; a cause is missing: {part:.2g} of the difference is left"
-    return dataclasses.replace(cause, sentence=rest)
 
 
 def _together(

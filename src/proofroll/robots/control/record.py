@@ -208,13 +208,11 @@ def _roundings(columns: Mapping[str, Array]) -> dict[str, Array]:
     written = [Decimal(repr(value)).normalize().as_tuple() for value in values.tolist()]
     places = max(-int(number.exponent) for number in written)
     digits = max(len(number.digits) for number in written)
-    with np.errstate(over="ignore"):
-        single = values.astype(np.float32)
-    texts = np.array([float(str(value)) for value in single])
-    is_single = bool(np.all((values == single) | (values == texts)))
     decimals = 0.5 * 10.0**-places if places <= _DECIMALS else 0.0
+    singles = {name: _is_single(column, digits) for name, column in columns.items()}
+    all_single = all(singles.values())
 
-    def rounding(column: Array) -> Array:
+    def rounding(name: str, column: Array) -> Array:
         sizes = np.abs(column)
         if digits < _DIGITS:
             first = np.floor(np.log10(np.where(sizes > 0, sizes, 1.0)))
@@ -222,10 +220,21 @@ def _roundings(columns: Mapping[str, Array]) -> dict[str, Array]:
         elif decimals:
             relative = np.zeros(column.shape)
         else:
+            is_single = all_single or (singles[name] and len(np.unique(column)) >= _MANY)
             relative = (_SINGLE if is_single else _DOUBLE) * sizes
         return np.maximum(decimals, relative)
 
-    return {name: rounding(column) for name, column in columns.items()}
+    return {name: rounding(name, column) for name, column in columns.items()}
+
+
+def _is_single(values: Array, digits: int) -> bool:
+    """True if all values are of single precision, written in full, to a number of digits or to the fewest that do."""
+    with np.errstate(over="ignore"):
+        singles = values.astype(np.float32)
+    for value, single in zip(values.tolist(), singles.tolist(), strict=True):
+        if value != single and value not in {float(str(np.float32(single))), float(f"{single:.{digits}g}")}:
+            return False
+    return True
 
 
 @dataclass(frozen=True)
@@ -245,6 +254,11 @@ class LayerCause:
     size: float | None
     after: float
     numbers: int = 0
+
+    def with_rest(self, part: float) -> LayerCause:
+        """The cause, which says which part of the difference it leaves."""
+        rest = f"{self.sentence}; a cause is missing: {part:.2g} of the difference is left"
+        return replace(self, sentence=rest)
 
 
 @dataclass(frozen=True)

@@ -66,10 +66,6 @@ def inertia_groups_ignored(evidence: RobotEvidence) -> Robot | None:
     return evidence.edited(lambda root: _without(root.iter("compiler"), "inertiagrouprange"))
 
 
-def _inertials(root: Element) -> list[tuple[str, Element]]:
-    return [(str(body.get("name")), inertial) for body in root.iter("body") for inertial in body.findall("inertial")]
-
-
 def _moments(inertial: Element) -> tuple[str, list[float]] | None:
     """The attribute that holds the moments, and its numbers."""
     for name in ("diaginertia", "fullinertia"):
@@ -88,7 +84,8 @@ def balance_ignored(evidence: RobotEvidence) -> Robot | None:
     root, more = copy.deepcopy(evidence.file.root), dict[str, float]()
     if not _without(root.iter("compiler"), "balanceinertia"):
         return None
-    for name, inertial in _inertials(root):
+    bodies = [(str(body.get("name")), inertial) for body in root.iter("body") for inertial in body.findall("inertial")]
+    for name, inertial in bodies:
         principal = _moments(inertial)
         if principal is not None:
             attribute, moments = principal
@@ -354,14 +351,11 @@ def tree_read_again(evidence: RobotEvidence) -> Robot | None:
     for name, joint in ((joint.name, joint) for joint in robot.moving):
         for again in (f"{name} ({number})" for number in range(2, times + 1)):
             bodies[again] = RobotBody(again, 0.0, np.zeros(3), np.zeros((3, 3)))
-            kept = joint.armature if _one_of_several(joint, robot) else 0.0
+            # Massless bodies ``name/0`` … connect several joints of a body in the file.
+            several = joint.parent.rpartition("/")[0] == joint.child or joint.child.rpartition("/")[0] in robot.bodies
+            kept = joint.armature if several else 0.0
             joints.append(dataclasses.replace(joint, name=again, parent=NO_BODY, child=again, armature=kept))
     return robot.change(bodies=bodies, joints=tuple(joints))
-
-
-def _one_of_several(joint: RobotJoint, robot: Robot) -> bool:
-    """True if the joint's body has further joints in the file: massless bodies ``name/0`` … connect them."""
-    return joint.parent.rpartition("/")[0] == joint.child or joint.child.rpartition("/")[0] in robot.bodies
 
 
 @hypothesis({"pybullet": "3.2.7"}, "give the root link a mass")

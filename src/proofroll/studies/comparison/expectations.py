@@ -59,9 +59,11 @@ def contradictions_of(
         alone = row.expect_for.get(name)
         if alone is not None and contradicts(verdict, {*alone, *NOBODY}):
             sentences.append(f"{place}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
-        if name in row.order and not unfinished and not _within(judgement.order, row.order[name]):
-            (low, high), order = row.order[name], number(judgement.order, 3, "not known")
-            sentences.append(f"{place}: order of {name} is {order}, expected {low:g} to {high:g}")
+        if name in row.order and not unfinished:
+            (low, high), order = row.order[name], judgement.order
+            if order is None or not low <= order <= high:
+                told = number(order, 3, "not known")
+                sentences.append(f"{place}: order of {name} is {told}, expected {low:g} to {high:g}")
         if name in row.limit and not unfinished:
             allowed = row.limit[name].absolute(judgement.scale)
             if judgement.limit_error is None or judgement.limit_error > allowed:
@@ -75,7 +77,3 @@ def contradictions_of(
     for name in sorted(claimed - {judgement.observable for judgement in judgements}):
         sentences.append(f"{place}: {name} is not reported, though {comparison.name} makes a claim about it")
     return sentences
-
-
-def _within(value: float | None, bounds: tuple[float, float]) -> bool:
-    return value is not None and bounds[0] <= value <= bounds[1]

@@ -17,7 +17,7 @@ from proofroll.core.element_abilities import MovesFreely, step_bound
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.multi_element import REQUIRED
 from proofroll.core.number_format import be, number, spaced
-from proofroll.core.observable import Observable, Role
+from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Allowance, Judgement, RunCurve, TrueCurve, Verdict, judge_curve
@@ -349,7 +349,9 @@ def _bounds(
         return _unit(reference, name)
 
     if bounds is None:
-        main = [name for name in observed if _is_main(scene.observables[name]) and not _unknown(reference, name)]
+        items = {name: scene.observables[name] for name in observed if not _unknown(reference, name)}
+        forces = {name for name, item in items.items() if item.role is Role.REACTION and item.unit != "1"}
+        main = [name for name, item in items.items() if item.headline or name in forces]
         events = [name for name in observed if (item := scene.observables[name]).watched and item.role is Role.EVENT]
         every = Tolerance(2 * reference.sampled_bar, False, "s")
         tolerances = dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
@@ -366,11 +368,6 @@ def _bounds(
         raise InputError("tolerance", "{}", "give a tolerance for each quantity")
     units = {name: unit_of(name) for name in bounds}
     return {name: Tolerance.of_quantity(f"tolerance of {name}", text, units[name]) for name, text in bounds.items()}
-
-
-def _is_main(item: Observable) -> bool:
-    """True if an observable is judged by default: headlines, and every force and moment."""
-    return item.headline or (item.role is Role.REACTION and item.unit != "1")
 
 
 def _unknown(reference: Reference, name: str) -> bool:

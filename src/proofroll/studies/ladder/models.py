@@ -126,7 +126,10 @@ def switches(
     models = [
         (rung.level, rung.model)
         for rung in ladder
-        if rung.model is not None and not rung.variant and _represents(engines[rung.model.engine], rung.model, scene)
+        if rung.model is not None
+        and not rung.variant
+        and isinstance(told := engines[rung.model.engine], EngineDescription)
+        and represents(scene, rung.model.formulation, told.provides)
     ]
     seen: set[tuple[str, Level]] = set()
     for level, model in models:
@@ -151,10 +154,6 @@ def switches(
             if model.formulation in term.formulations
         ]
     return switches_of_terms
-
-
-def _represents(description: EngineDescription | ProofrollError, model: LadderModel, scene: Scene) -> bool:
-    return isinstance(description, EngineDescription) and represents(scene, model.formulation, description.provides)
 
 
 def _of_the_scene(model: LadderModel, scene: Scene, truth: xr.Dataset, inherent: Mapping[str, str]) -> list[Switch]:

@@ -13,7 +13,7 @@ from proofroll.core.errors import InputError, ProofrollError, error_location, re
 from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
-from proofroll.files.toml import study_content, study_files
+from proofroll.files.toml import named_file, study_content, study_files
 from proofroll.studies.failure import meanings
 from proofroll.studies.stability.axes import Axis, AxisTerm
 from proofroll.studies.stability.records import Boundary, BoundaryPoint, StabilityStudy, dependence
@@ -154,16 +154,16 @@ class StabilityFile:
 
 
 def file_for(scene: str) -> StabilityFile:
-    """Stability file at a path that ends in ``.toml``, or about a named scene, or a default map of its parameters.
+    """Stability file by its path or name, or about a named scene, or a default map of the scene's parameters.
 
     Raises:
         InputError: there is no such scene, or the file is broken.
     """
-    if Path(scene).suffix == ".toml" and not is_scene(scene):
-        return _load(Path(scene))
-    for path, content in study_files(STUDY):
-        if content.get("scene") == scene:
-            return _load(path)
+    named = None if is_scene(scene) else named_file(scene)
+    about = (path for path, content in study_files(STUDY) if content.get("scene") == scene)
+    path = named or next(about, None)
+    if path is not None:
+        return _load(path)
     question = "Up to which step or tolerance is each engine stable, and up to which is it right to 1 %?"
     return StabilityFile(
         name=Path(scene).stem,

@@ -28,7 +28,7 @@ class FiguresPart(Part):
     key: ClassVar[str] = "figures"
     order: ClassVar[float] = 10
     words: ClassVar[str] = "figures"
-    command: ClassVar[str] = "paper figures {.name}"
+    command: ClassVar[str] = "paper figures"
     template: ClassVar[str] = "figures.html"
     names: ClassVar[Mapping[str, Any]] = {"statements": writing}
     asked: Figures

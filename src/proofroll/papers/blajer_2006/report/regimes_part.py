@@ -27,7 +27,7 @@ class RegimesPart(Part):
     key: ClassVar[str] = "regimes"
     order: ClassVar[float] = 20
     words: ClassVar[str] = "regime maps"
-    command: ClassVar[str] = "paper regimes {.name}"
+    command: ClassVar[str] = "paper regimes"
     template: ClassVar[str] = "regimes.html"
     asked: RegimesStudy
     maps: list[xr.Dataset] = field(default_factory=list)

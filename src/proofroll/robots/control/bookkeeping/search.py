@@ -409,7 +409,8 @@ def _pair(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials, t
             continue
         beside = wrong & ~changed[first.mistake.words]
         others = [item for item in candidates if item.id != first.mistake.id and np.all(changed[item.words][beside])]
-        for second in itertools.chain(_sized(others, first.law, trials), _fitting(first.law, trials)):
+        fitting = (_Told(item, 1.0, item.changed(first.law, 1.0)) for item in trials.fitting(first.law))
+        for second in itertools.chain(_sized(others, first.law, trials), fitting):
             if time.over:
                 return best
             if np.all(trials.parts(second.law) <= 1) and (not best or second.numbers < best[1].numbers):
@@ -447,8 +448,3 @@ def _sized(candidates: Sequence[Mistake], law: ControlLaw, trials: LayerTrials) 
         for start in item.starts if item.sized else ():
             size = fitted(lambda size, changed=changed: trials.left(changed(size)), start)  # type: ignore[misc]
             yield _Told(item, size, changed(size))
-
-
-def _fitting(law: ControlLaw, trials: LayerTrials) -> Iterator[_Told]:
-    """Mistakes whose numbers fit what a law leaves."""
-    yield from (_Told(item, 1.0, item.changed(law, 1.0)) for item in trials.fitting(law))
