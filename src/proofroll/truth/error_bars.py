@@ -37,7 +37,8 @@ class Routed(NamedTuple):
     Attributes:
         record: the motion.
         works: work of drives since the start [J], (times, drives).
-        pressed: contact forces [N] and moments against turning [N m], (times, contacts, 6); None: no contacts.
+        pressed: contact forces [N], moments against turning [N m] and normal forces [N] where components of a force are
+            not determinate, (times, contacts, 7); None: no contacts.
         sums: sums of the forces [N], (times, sums, 3); None: as ``pressed``.
     """
 
@@ -66,8 +67,7 @@ class TwoRouteMotion:
         reason: cause why the question is ill-posed from the horizon on.
         end: time from which the motion is not known, s; the record ends before it; inf: it reaches all times asked for.
         ended: reason why it ends there, as a clause.
-        pressed: contact forces [N] and moments against turning [N m] on the first bodies, (times, contacts, 6), NaN
-            where not determinate; None: no contacts.
+        pressed: as of :class:`Routed`, on the first bodies, NaN where not determinate.
         sums: sums of the forces, (times, sums, 3); None: as ``pressed``.
         works: work of drives since the start [J], (times, drives).
         laws: outcome of the law check, as a clause; empty: it ended the motion, or there was none.

@@ -233,7 +233,8 @@ def _fields(mechanism: Mechanism, motion: Routed, determinate: NDArray[np.bool_]
     fields = fields_with_bars(mechanism, _masked(motion, determinate)) | {"work": motion.works}
     if motion.pressed is None or motion.sums is None:
         return fields
-    return fields | {"pressed": motion.pressed[..., :3], "turning": motion.pressed[..., 3:], "sums": motion.sums}
+    forces, turning = motion.pressed[..., [0, 1, 2, 6]], motion.pressed[..., 3:6]
+    return fields | {"pressed": forces, "turning": turning, "sums": motion.sums}
 
 
 def _left_by_a_cut(

@@ -167,10 +167,8 @@ def _columns(element: MechanismElement, motion: TwoRouteMotion | Routed) -> Colu
     """Variables of a motion."""
     record, placed = motion.record, motion.record.placed(element.mechanism)
     wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
-    borne = np.zeros((len(record.time), 0, 6)) if motion.pressed is None else motion.pressed
-    return columns(
-        element, placed, wrench, borne[..., :3], record.named, motion.sums, UNDETERMINED, motion.works, borne[..., 3:]
-    )
+    borne = np.zeros((len(record.time), 0, 7)) if motion.pressed is None else motion.pressed
+    return columns(element, placed, wrench, borne, record.named, motion.sums, UNDETERMINED, motion.works)
 
 
 def _unknown_from(element: MechanismElement, motion: TwoRouteMotion) -> tuple[float, str] | None:

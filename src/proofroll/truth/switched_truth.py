@@ -19,7 +19,6 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.modes import REST, Acting, ContactMode
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
-from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.dynamics.placed import Placed
@@ -299,7 +298,8 @@ def _in_si(mechanism: Mechanism, units: Units, routed: Routed, times: Array | No
     record, moment = units.record(mechanism, natural), units.force * units.length
     if routed.pressed is None:
         return routed._replace(record=record)
-    pressed, count = routed.pressed * np.repeat([units.force, moment], 3), len(contact_sums(mechanism.contacts))
+    sizes, count = np.array([*[units.force] * 3, *[moment] * 3, units.force]), len(contact_sums(mechanism.contacts))
+    pressed = routed.pressed * sizes
     if routed.sums is None:
         return routed._replace(record=record, pressed=pressed, sums=_sums_along(record.placed(mechanism), pressed))
     is_moment = np.arange(routed.sums.shape[1]) >= count
@@ -316,8 +316,7 @@ def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:
     stretch = path.stretches[path.stretch_at(np.array([time]))[0]]
     q, v, begun = dynamics.parts(stretch.first)
     solution = dynamics.solve(q, v, stretch.mode, begun)
-    pairs = zip(dynamics.contacts, solution.determinate, solution.state.touching, strict=True)
-    sharing = [contact for contact, determinate, touch in pairs if not determinate[np.abs(touch.normal) > RANK].all()]
+    sharing = [contact for contact, N in zip(dynamics.contacts, solution.normal_forces, strict=True) if np.isnan(N)]
     if not sharing:
         return ""
     names = dict.fromkeys(contact.name for contact in sharing)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.truth.check.laws.integrals import cross, dot, norm, turned
+from proofroll.truth.check.laws.integrals import along, cross, dot, norm, turned
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Pieces
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
@@ -75,7 +75,7 @@ def contact_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads
 
 def _touch(scene: LawScene, pieces: Pieces, k: int, contact: PairContact) -> ClosedContact:
     normal, force = pieces.normal[..., k, :], pieces.force[..., k, :]
-    slide, pressed = slide_of(contact, pieces, pieces.place[..., k, :]), dot(normal, force)
+    slide, pressed = slide_of(contact, pieces, pieces.place[..., k, :]), along(force, normal)
     ends = contact.a, contact.b
     fast = scene.speed + sum(norm(pieces.v[..., body, :]) for body in ends)
     fast = fast + sum(norm(pieces.w[..., body, :]) for body in ends) * scene.length
