@@ -59,8 +59,12 @@ class EarlyEnd:
                 self.at(stopped.time, str(stopped))
 
 
-def cut_at(path: _Path, end: float, text: str) -> _Path:
-    """Path up to a time, and the reason why it ends there."""
+def cut_at(paths: tuple[_Path, _Path], end: float, text: str) -> tuple[_Path, _Path]:
+    """Paths up to a time, or whole if that is inf, and the reason why they end there."""
+    return paths if np.isinf(end) else (_cut_at(paths[0], end, text), _cut_at(paths[1], end, text))
+
+
+def _cut_at(path: _Path, end: float, text: str) -> _Path:
     kept = [stretch for stretch in path.stretches if stretch.start < end]
     last = kept[-1]
     if last.end > end:

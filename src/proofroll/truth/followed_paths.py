@@ -88,24 +88,28 @@ def followed(
 
 
 def cut_early(
-    route: HybridRoute[ModeT],
-    path: HybridPath[Stretch[ModeT]],
-    until: float,
-    kinks: Sequence[float],
-    times: Array,
-    kinds: Callable[[Any], Any] = lambda mode: mode,
-) -> tuple[HybridPath[Stretch[ModeT]], NDArray[np.bool_]] | None:
-    """Path of a ``route`` that cuts infinitely many rebounds early, and at which times it has the mode of the path.
+    route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], until: float, kinks: Sequence[float]
+) -> HybridPath[Stretch[ModeT]] | None:
+    """Path of a ``route`` that cuts infinitely many rebounds early; None: no rebounds were cut.
 
     The error of a cut is quadratic in its speed, so that of the path itself is at most a third of their difference.
-    None: no rebounds were cut.
     """
     if not any(item.kind == EventKind.SETTLE for item in path.happenings):
         return None
-    early = follow(route, until, kinks, CLOSE)
+    try:
+        PACE.follow("early", until)
+        return follow(route, until, kinks, CLOSE)
+    finally:
+        PACE.leave()
+
+
+def counts_early(
+    path: FollowedPath, early: FollowedPath, times: Array, kinds: Callable[[Any], Any]
+) -> NDArray[np.bool_]:
+    """True at times at which a path with rebounds cut early has the mode of the path."""
     modes = ([kinds(item.stretches[k].mode) for k in item.stretch_at(times)] for item in (path, early))
     alike = np.array([mode_of_path == early_mode for mode_of_path, early_mode in zip(*modes, strict=True)])
-    return early, alike & (early.known | (times < early.stretches[-1].end))
+    return alike & (early.known | (times < early.stretches[-1].end))
 
 
 def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:

@@ -40,6 +40,7 @@ from proofroll.truth.followed_paths import (
     TOLERANCES,
     at_times,
     counterparts,
+    counts_early,
     cut_early,
     followed,
     refuse_uncovered,
@@ -90,9 +91,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     plain = [values.own for values in held_paths] or [scaled, scaled]
     dynamics, second = ContactDynamics(plain[0]), MaximalCoordinates(plain[1])
     check_start(dynamics.equations, second, units.length)
-    size = _size(dynamics)
-    tree, equations = ContactTree(dynamics, TOLERANCES[0], size), ContactEquations(plain[1], second.lean)
-    bodies = ContactBodies(equations, TOLERANCES[1], size)
+    size, equations = _size(dynamics), ContactEquations(plain[1], second.lean)
+    tree, bodies = ContactTree(dynamics, TOLERANCES[0], size), ContactBodies(equations, TOLERANCES[1], size)
     tree.faces = bodies.faces = faces
     until, breaking, kinds = float(times[-1]), breaks(scaled.signals), partial(_kinds, dynamics)
     paths, routes = _followed(tree, bodies, held_paths, until, breaking)
@@ -101,10 +101,13 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         of_bodies(mechanism, units, bodies, second, paths[1], held_paths[1] if held_paths else None),
     ]
     outcome = held_to_laws(mechanism, units, of_routes)
-    if np.isfinite(outcome.end):
-        paths = cut_at(paths[0], outcome.end, outcome.text), cut_at(paths[1], outcome.end, outcome.text)
+    paths = cut_at(paths, outcome.end, outcome.text)
     reason = _reason(dynamics, paths)
     asked = times_known(paths, times, reason)
+    early = None if held_paths else cut_early(tree.early(), paths[0], float(asked[-1]), breaking)
+    if early is not None and early.ended and early.ended == PACE.reason:  # from there on nothing tells what cuts leave
+        paths = cut_at(paths, early.stretches[-1].end, PACE.reason)
+        asked = times_known(paths, asked, reason)
     times = held_paths[1].on_instants(held_paths[0].on_instants(asked)) if held_paths else asked
 
     def sampled(times: Array) -> tuple[list[int], list[int], Routed, Routed]:
@@ -117,8 +120,7 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         return stretches, others, by_tree, Routed(record, by_tree.works, pressed if scaled.contacts else None)
 
     count = PACE.fitting(times, sampled)
-    if count < len(times):
-        paths = cut_at(paths[0], float(times[count]), PACE.reason), cut_at(paths[1], float(times[count]), PACE.reason)
+    paths = cut_at(paths, float([*times, np.inf][count]), PACE.reason)
     times, asked = times[:count], asked[:count]
     stretches, others, by_tree, by_bodies = sampled(times)
     seconds, known_until = times * units.time, _works_known(tree, paths[0])
@@ -127,14 +129,15 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     works = np.where(times[:, None] > known_until, np.nan, work_of_tree)
     unresolved = np.max([*rest_of_tree, *rest], axis=0)[:, np.isinf(known_until)].max(axis=1, initial=0.0)
     by_tree, by_bodies = by_tree._replace(works=works), by_bodies._replace(works=work_of_bodies)
-    cut = None if held_paths else cut_early(tree.early(), paths[0], float(times[-1]), breaking, times, kinds)
     left = None
-    if cut is not None:
-        earlier = at_times(cut[0], counterparts((paths[0], cut[0]), stretches, kinds), times, kinds)
-        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier)
-        early_works = work_along(mechanism, units, tree, cut[0]).at(seconds, earlier)[0]
-        early = early._replace(record=on_same_turns(scaled, by_tree.record, early.record), works=early_works)
-        left = _in_si(mechanism, units, early), cut[1]
+    if early is not None:
+        earlier = at_times(early, counterparts((paths[0], early), stretches, kinds), times, kinds)
+        routed = _by_the_tree(tree, early, times, states_of(tree, early, times, earlier), earlier)
+        routed = routed._replace(
+            record=on_same_turns(scaled, by_tree.record, routed.record),
+            works=work_along(mechanism, units, tree, early).at(seconds, earlier)[0],
+        )
+        left = _in_si(mechanism, units, routed), counts_early(paths[0], early, times, kinds)
     middles = _between(tree, routes[0], paths[0])
     motion = replace(
         two_route_motion(

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.errors import Refused
+from proofroll.core.pace import PACE, OutOfTime
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.dynamics.link_forces import working
@@ -64,7 +65,8 @@ class HeldMotion(NamedTuple):
     """Outcome of the law check.
 
     Attributes:
-        end: time of the first violation of a law, in natural units; inf: there is none.
+        end: time of the first violation of a law, or up to which the limit of a truth lets routes be held to them, in
+            natural units; inf: there is none.
         text: its reason.
         laws: sentence of the outcome; empty after a violation, and where there are no transitions.
         works: work of drives along each route.
@@ -93,14 +95,19 @@ def held_to_laws(mechanism: Mechanism, units: Units, routes: Sequence[LawRecorde
     paths = [route.path for route in routes]
     early = min((path.stretches[-1].end for path in paths if not path.known), default=np.inf)
     walks = [_Walk(mechanism, units, route) for route in routes]
-    parts = walks[0].through(min(early, first_close(paths, CLOSE)) * (1 - CLOSE))
-    for walk in walks[1:] if working(mechanism) else ():
-        walk.through(0.0)
+    try:
+        PACE.follow("laws", np.inf)
+        parts = walks[0].through(min(early, first_close(paths, CLOSE)) * (1 - CLOSE))
+        for walk in walks[1:] if working(mechanism) else ():
+            walk.through(0.0)
+    finally:
+        PACE.leave()
     works, residuals, tiles = [walk.work for walk in walks], walks[0].residuals, _joined(parts, routes[0])
     tiles = None if tiles is None else replace(tiles, impulses=tuple(walks[0].impulses))
-    text = residuals.broken("the motion that was followed")
+    text, reached = residuals.broken("the motion that was followed"), min(walk.reached for walk in walks)
     if residuals.first is None:
-        return HeldMotion(end=np.inf, text="", laws=residuals.held(), works=works, tiles=tiles)
+        text = "" if np.isinf(reached) else PACE.reason
+        return HeldMotion(end=reached, text=text, laws=residuals.held(), works=works, tiles=tiles)
     if residuals.first.time <= CLOSE * units.time:
         raise Refused(text)
     return HeldMotion(end=residuals.first.time / units.time, text=text, laws="", works=works, tiles=tiles)
@@ -134,19 +141,26 @@ class _Walk:
         residuals: remainders of the laws of transitions.
         work: of drives.
         impulses: time of each impact that driven joints take a part of [s], and the impulses along these.
+        reached: start of the first stretch that the limit of a truth leaves out, in natural units; inf: there is none.
     """
 
     def __init__(self, mechanism: Mechanism, units: Units, route: LawRecorder) -> None:
         self._route, scale = route, (units.length, 1 / units.time)
         self._scene, self.residuals = LawScene(mechanism, *scale), LawResiduals(rate=scale[1])
         self.work, self._working = WorkAlong(mechanism, *scale), bool(working(mechanism))
-        self.impulses = list[tuple[float, dict[int, float]]]()
+        self.impulses, self.reached = list[tuple[float, dict[int, float]]](), np.inf
 
     def through(self, end: float) -> list[Tiles | None]:
         """Tiles of all stretches; transitions are judged up to a time in natural units."""
         parts, ending, route = list[Tiles | None](), None, self._route
         fastest, unjudged = dict[str, float](), LawResiduals(rate=self.residuals.rate)
         for number, stretch in enumerate(route.path.stretches):
+            try:
+                if number:
+                    PACE.reached(stretch.start)
+            except OutOfTime:
+                self.reached = stretch.start
+                break
             if route.held is not None:
                 route.held.recall(stretch.start)
             if ending is not None:
