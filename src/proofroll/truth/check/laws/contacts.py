@@ -42,9 +42,21 @@ def apart(scene: LawScene, contact: PairContact, pieces: BodyPoses, residuals: L
     residuals.note("gap", contact.name, np.maximum(-gap_of(contact, pieces), 0), far, pieces.time)
 
 
-def slide_of(contact: PairContact, pieces: Pieces, place: Array) -> Array:
+def slide_of(contact: PairContact, pieces: BodyPoses, place: Array) -> Array:
     """Velocity of the first body against the second at places [m/s]."""
     return velocity_at(pieces, contact.a, place) - velocity_at(pieces, contact.b, place)
+
+
+def slip_of_ball(contact: PairContact, pieces: BodyPoses) -> Array:
+    """Slip of a ball, a corner or an end on another shape, by poses alone [m/s]."""
+    ball, other, body, base = contact.shape_a, contact.shape_b, contact.a, contact.b
+    if ball.kind != "sphere":
+        ball, other, body, base = other, ball, base, body
+    pose, centre = (pieces.p[..., base, :], pieces.R[..., base, :, :]), pieces.p[..., body, :]
+    centre = centre + turned(pieces.R[..., body, :, :], ball.centre)
+    normal = turned(pose[1], near(other, seen_from(pose, centre))[1])
+    slide = slide_of(contact, pieces, centre - ball.radius * normal)
+    return np.asarray(slide - dot(slide, normal)[..., None] * normal)
 
 
 def contact_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: BodyLoads) -> None:
