@@ -21,12 +21,14 @@ from proofroll.elements.mechanism.scene.shapes.features import Border
 from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import CircleShape, EllipsoidShape, HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
-from proofroll.truth.numerics.scalars import Scalar, add, dot, is_zero, minus, mul, scaled, sub
+from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, minus, mul, scaled, sub
 from proofroll.truth.switching.contact_guards import LEAST_RESPONSE, NOT_SHARED, TURNED, ContactGuard, Touchable
 
 Vector = Sequence[Scalar]
 _MOST_VELOCITIES = 10  # of one tree whose modes are compiled: 8 take a quarter of a second, 12 take eight seconds
 _NONE = (0.0, 0.0, 0.0)
+# Direction that no normal of a scene has; across a normal it is one in its plane.
+_ASIDE = (0.2811, 0.4937, 0.8229)
 
 
 class ScalarTouch(NamedTuple):
@@ -171,6 +173,10 @@ def rows_of(
     """Rows of a closed contact or law of a joint; dry friction of a joint and of turning has no normal."""
     if contact.pressed_by is not None and kind == "slip":
         return HeldRows([], [])
+    if contact.pressed_by is not None and line is None:  # rolling that stands in its plane
+        first = cross(touch.normal, _ASIDE)
+        ways: list[Vector] = [first, cross(touch.normal, first)]
+        return HeldRows(ways, ways)
     if contact.bound or contact.pressed_by is not None:
         assert line is not None  # it has one coordinate
         return HeldRows([line], [line]) if kind == "stick" else HeldRows([], [])

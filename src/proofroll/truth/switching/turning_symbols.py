@@ -55,14 +55,6 @@ def opposed_rates(
     return whole
 
 
-def follows(mode: ContactMode, contacts: Sequence[Touchable]) -> bool:
-    """True if a mode has a rule in symbols: rolling that stands in its plane has none."""
-    return not any(
-        acting.kind == "stick" and acting.along is None and contact.pressed_by is not None
-        for acting, contact in zip(mode, contacts, strict=True)
-    )
-
-
 class TurningMoments:
     """Moments of friction against turning that the normal forces of contacts bring."""
 
