@@ -311,14 +311,19 @@ def at_times(
     """Numbers of a path's stretches at times in natural units, near the given ones and of the same kinds of mode.
 
     A route may divide what the other follows in one stretch at another time, as the beginning of a slip. No time is
-    taken across a jump of the state, as at an impact, where both routes give the value on the same side.
+    taken across a jump of the state, as at an impact, or across a turn of a slip, where both routes give the value on
+    the same side.
     """
-    states = []
+    states, turns = [], {item.time for item in path.happenings if item.kind == EventKind.TURN}
     for number, time in zip(stretches, times, strict=True):
         near = number
-        while near > 0 and time <= path.stretches[near].start and _goes_on(path.stretches[near - 1 :], kinds):
+        while near > 0 and time <= (start := path.stretches[near].start) and _goes_on(path.stretches[near - 1 :], kinds):
+            if start in turns:
+                break
             near -= 1
-        while time >= path.stretches[near].end and _goes_on(path.stretches[near:], kinds):
+        while time >= (end := path.stretches[near].end) and _goes_on(path.stretches[near:], kinds):
+            if end in turns:
+                break
             near += 1
         states.append(near)
     return states
