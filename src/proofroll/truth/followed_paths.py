@@ -88,28 +88,24 @@ def followed(
 
 
 def cut_early(
-    route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], until: float, kinks: Sequence[float]
-) -> HybridPath[Stretch[ModeT]] | None:
-    """Path of a ``route`` that cuts infinitely many rebounds early; None: no rebounds were cut.
+    route: HybridRoute[ModeT],
+    path: HybridPath[Stretch[ModeT]],
+    until: float,
+    kinks: Sequence[float],
+    times: Array,
+    kinds: Callable[[Any], Any] = lambda mode: mode,
+) -> tuple[HybridPath[Stretch[ModeT]], NDArray[np.bool_]] | None:
+    """Path of a ``route`` that cuts infinitely many rebounds early, and at which times it has the mode of the path.
 
     The error of a cut is quadratic in its speed, so that of the path itself is at most a third of their difference.
+    None: no rebounds were cut.
     """
     if not any(item.kind == EventKind.SETTLE for item in path.happenings):
         return None
-    try:
-        PACE.follow("early", until)
-        return follow(route, until, kinks, CLOSE)
-    finally:
-        PACE.leave()
-
-
-def counts_early(
-    path: FollowedPath, early: FollowedPath, times: Array, kinds: Callable[[Any], Any]
-) -> NDArray[np.bool_]:
-    """True at times at which a path with rebounds cut early has the mode of the path."""
+    early = follow(route, until, kinks, CLOSE)
     modes = ([kinds(item.stretches[k].mode) for k in item.stretch_at(times)] for item in (path, early))
     alike = np.array([mode_of_path == early_mode for mode_of_path, early_mode in zip(*modes, strict=True)])
-    return alike & (early.known | (times < early.stretches[-1].end))
+    return early, alike & (early.known | (times < early.stretches[-1].end))
 
 
 def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:
@@ -314,16 +310,17 @@ def at_times(
     taken across a jump of the state, as at an impact, or across a turn of a slip, where both routes give the value on
     the same side.
     """
+
+    def passes(number: int) -> bool:
+        """True if nothing but the time divides a stretch from the next one."""
+        return path.stretches[number].end not in turns and _goes_on(path.stretches[number:], kinds)
+
     states, turns = [], {item.time for item in path.happenings if item.kind == EventKind.TURN}
     for number, time in zip(stretches, times, strict=True):
         near = number
-        while near > 0 and time <= (start := path.stretches[near].start) and _goes_on(path.stretches[near - 1 :], kinds):
-            if start in turns:
-                break
+        while near > 0 and time <= path.stretches[near].start and passes(near - 1):
             near -= 1
-        while time >= (end := path.stretches[near].end) and _goes_on(path.stretches[near:], kinds):
-            if end in turns:
-                break
+        while time >= path.stretches[near].end and passes(near):
             near += 1
         states.append(near)
     return states

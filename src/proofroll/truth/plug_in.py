@@ -59,7 +59,7 @@ class MechanismTruth:
         """See :func:`proofroll.truth.truth_of_mechanism.truth_of`; of motions that are not unique, laws alone."""
         # imports of a third of a second, which what has another truth does not need
         from proofroll.truth.check.answer import held_answer
-        from proofroll.truth.early_end import cut_motion
+        from proofroll.truth.error_bars import cut_motion
         from proofroll.truth.smooth.smooth_truth import branching
         from proofroll.truth.truth_of_mechanism import truth_of
 

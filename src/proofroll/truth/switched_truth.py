@@ -33,14 +33,12 @@ from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, work_along
-from proofroll.truth.early_end import cut_at
-from proofroll.truth.error_bars import ROUND_OFF, Routed, TwoRouteMotion, check_start, on_same_turns
+from proofroll.truth.error_bars import ROUND_OFF, Routed, TwoRouteMotion, check_start, cut_at, on_same_turns
 from proofroll.truth.followed_paths import (
     CLOSE,
     TOLERANCES,
     at_times,
     counterparts,
-    counts_early,
     cut_early,
     followed,
     refuse_uncovered,
@@ -101,13 +99,10 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         of_bodies(mechanism, units, bodies, second, paths[1], held_paths[1] if held_paths else None),
     ]
     outcome = held_to_laws(mechanism, units, of_routes)
-    paths = cut_at(paths, outcome.end, outcome.text)
+    if np.isfinite(outcome.end):
+        paths = cut_at(paths[0], outcome.end, outcome.text), cut_at(paths[1], outcome.end, outcome.text)
     reason = _reason(dynamics, paths)
     asked = times_known(paths, times, reason)
-    early = None if held_paths else cut_early(tree.early(), paths[0], float(asked[-1]), breaking)
-    if early is not None and early.ended and early.ended == PACE.reason:  # from there on nothing tells what cuts leave
-        paths = cut_at(paths, early.stretches[-1].end, PACE.reason)
-        asked = times_known(paths, asked, reason)
     times = held_paths[1].on_instants(held_paths[0].on_instants(asked)) if held_paths else asked
 
     def sampled(times: Array) -> tuple[list[int], list[int], Routed, Routed]:
@@ -120,7 +115,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         return stretches, others, by_tree, Routed(record, by_tree.works, pressed if scaled.contacts else None)
 
     count = PACE.fitting(times, sampled)
-    paths = cut_at(paths, float([*times, np.inf][count]), PACE.reason)
+    if count < len(times):
+        paths = cut_at(paths[0], float(times[count]), PACE.reason), cut_at(paths[1], float(times[count]), PACE.reason)
     times, asked = times[:count], asked[:count]
     stretches, others, by_tree, by_bodies = sampled(times)
     seconds, known_until = times * units.time, _works_known(tree, paths[0])
@@ -129,15 +125,14 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     works = np.where(times[:, None] > known_until, np.nan, work_of_tree)
     unresolved = np.max([*rest_of_tree, *rest], axis=0)[:, np.isinf(known_until)].max(axis=1, initial=0.0)
     by_tree, by_bodies = by_tree._replace(works=works), by_bodies._replace(works=work_of_bodies)
+    cut = None if held_paths else cut_early(tree.early(), paths[0], float(times[-1]), breaking, times, kinds)
     left = None
-    if early is not None:
-        earlier = at_times(early, counterparts((paths[0], early), stretches, kinds), times, kinds)
-        routed = _by_the_tree(tree, early, times, states_of(tree, early, times, earlier), earlier)
-        routed = routed._replace(
-            record=on_same_turns(scaled, by_tree.record, routed.record),
-            works=work_along(mechanism, units, tree, early).at(seconds, earlier)[0],
-        )
-        left = _in_si(mechanism, units, routed), counts_early(paths[0], early, times, kinds)
+    if cut is not None:
+        earlier = at_times(cut[0], counterparts((paths[0], cut[0]), stretches, kinds), times, kinds)
+        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier)
+        early_works = work_along(mechanism, units, tree, cut[0]).at(seconds, earlier)[0]
+        early = early._replace(record=on_same_turns(scaled, by_tree.record, early.record), works=early_works)
+        left = _in_si(mechanism, units, early), cut[1]
     middles = _between(tree, routes[0], paths[0])
     motion = replace(
         two_route_motion(

@@ -26,7 +26,6 @@ from proofroll.running.store import Store
 from proofroll.studies.cases import case_of
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.check import held_to_laws
-from proofroll.truth.tree.contact_tree import ContactTree
 
 TIMES = np.linspace(0.0, 1.0, 101)
 
@@ -110,7 +109,6 @@ def test_a_truth_that_was_cut_is_not_stored(tmp_path: Path) -> None:
 
 CHECKS = {
     "transitions": ("bouncing_ball", {"restitution": 0.7}, held_to_laws, "transition", 3.0),
-    "rebounds cut early": ("bouncing_ball", {"restitution": 0.5}, ContactTree, "early", 3.0),
     "witness of a closed form": ("four_bar", {}, JointCoordinates, "rk4_states", 0.1),
 }
 
@@ -128,15 +126,10 @@ def test_a_check_is_within_the_limit(check: str, monkeypatch: pytest.MonkeyPatch
         clock[0] += seconds
         return run(*given, **named)
 
-    def slow_route(tree: ContactTree) -> ContactTree:
-        route = plain(tree)
-        monkeypatch.setattr(route, "walk", partial(slow, route.walk))
-        return route
-
     def slow_states(equations: JointCoordinates, *given: Any) -> Iterator[Any]:
         yield from (slow(lambda state: state, state) for state in plain(equations, *given))
 
-    slowed = {"early": slow_route, "rk4_states": slow_states}.get(function, partial(slow, plain))
+    slowed = {"rk4_states": slow_states}.get(function, partial(slow, plain))
     monkeypatch.setattr("proofroll.core.pace.time.process_time", lambda: clock[0])
     monkeypatch.setattr(owner, function, slowed)
     with PACE.limited(10.0):

@@ -31,9 +31,9 @@ from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
 from proofroll.truth.check.held_to_laws import of_bodies, of_tree, tiles_of
-from proofroll.truth.early_end import EarlyEnd
 from proofroll.truth.error_bars import (
     NUDGE,
+    EarlyEnd,
     Routed,
     TwoRouteMotion,
     check_start,

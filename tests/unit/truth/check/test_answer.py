@@ -18,8 +18,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.check.answer import held_answer
-from proofroll.truth.early_end import cut_motion
-from proofroll.truth.error_bars import TwoRouteMotion
+from proofroll.truth.error_bars import TwoRouteMotion, cut_motion
 from proofroll.truth.plug_in import MechanismTruth, _unknown_from
 from proofroll.truth.truth_of_mechanism import truth_of
 

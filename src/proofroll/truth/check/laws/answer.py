@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.truth.check.laws.contacts import slip_of_ball
 from proofroll.truth.check.laws.impacts import held
 from proofroll.truth.check.laws.integrals import cross, integral
-from proofroll.truth.check.laws.joint_forces import law_of, target_of
+from proofroll.truth.check.laws.joints import law_of, target_of
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.motion import Turns, changed_velocity, laws_at_all_times, start_of
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Modes, PublishedEvent, PublishedValues
@@ -113,7 +113,7 @@ def _slips(scene: LawScene, tiles: Tiles) -> list[tuple[str, Array]]:
     of_contacts = [
         (contact.name, slip_of_ball(contact, tiles), [mode.contacts[k] for mode in tiles.modes])
         for k, contact in enumerate(scene.contacts)
-        if contact.pair.friction and contact.has_ball
+        if contact.pair.friction and "sphere" in {contact.shape_a.kind, contact.shape_b.kind}
     ]
     slipping = ((name, slip, np.array(modes) == "slip") for name, slip, modes in (*of_joints, *of_contacts))
     return [(name, slip * slips[:, None, None]) for name, slip, slips in slipping]

@@ -60,11 +60,6 @@ class PairContact(NamedTuple):
     solid_b: SurfaceShape
     alone: bool  # its gap is that of the shapes; False: one of several places where two solids meet
 
-    @property
-    def has_ball(self) -> bool:
-        """True if one of the shapes is a ball, a corner or an end."""
-        return "sphere" in {self.shape_a.kind, self.shape_b.kind}
-
 
 def shape_of(geometry: Geometry) -> SurfaceShape:
     """Whole shape of a geometry."""
