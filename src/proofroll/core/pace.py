@@ -11,9 +11,9 @@ from proofroll.core.errors import Diverged
 _EVERY = 1.0  # s of processor time between two messages
 _TELLING = 0.01  # part of a route from which its pace is told: the first steps are shorter than those to come
 AT = "truth at "  # beginning of a line that a worker prints about it
-# Route -> part of the limit that is used when it ends; then motions are held against laws, and sampled. Where nothing
-# switches both are followed again from a start beside.
-_ROUTES = {"first": 0.4, "second": 0.8, "steps": 1.0}
+# Route, or check -> part of the limit that is used when it ends; then motions are sampled. Where nothing switches both
+# are followed again from a start beside. A closed form is checked about as long as its witness takes.
+_ROUTES = {"first": 0.4, "second": 0.8, "laws": 0.9, "steps": 1.0, "witness": 0.5}
 _SMOOTH = 0.6875
 # Processor time of a sample [s] that all but the dearest need; number of samples by which a time is foretold.
 _SAMPLE, _FEW = 0.1, 16
@@ -61,9 +61,10 @@ class Pace:
             self._tell("")  # what was told before is over
 
     def follow(self, route: str, end: float, *, smooth: bool = False) -> None:
-        """Begins the ``first`` or ``second`` route, or the only one by ``steps``, to an end in its own unit of time.
+        """Begins a route, or a check, to an end in its own unit of time.
 
-        ``smooth``: nothing switches.
+        ``route``: ``first`` or ``second``, or the only one by ``steps``; the check of ``laws``; the ``witness`` of a
+        closed form. ``smooth``: nothing switches.
         """
         self._route, self._begun, self._end = route, (time.process_time(), -1.0), end
         self._part = _ROUTES[route] * (_SMOOTH if smooth else 1.0)

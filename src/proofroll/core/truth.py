@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
-from proofroll.core.dataset import ENDED, ENDS, LAWS, ended_early, joined, off_grid_apart
+from proofroll.core.dataset import BORDERS, ENDED, ENDS, LAWS, ended_early, joined, off_grid_apart
 from proofroll.core.element import Element
 from proofroll.core.entry_points import loaded
 from proofroll.core.errors import InputError, Refused
@@ -140,6 +140,8 @@ def truth(
         texts = dict.fromkeys(str(part.attrs[name]) for part in parts.values() if part.attrs.get(name))
         if texts:
             whole.attrs[name] = "; ".join(texts)
+    if borders := [part.attrs[BORDERS] for part in parts.values() if BORDERS in part.attrs]:
+        whole.attrs[BORDERS] = np.unique(np.concatenate(borders))
     read_only([variable.values for variable in whole.variables.values()])
     return whole
 

@@ -1,18 +1,23 @@
-"""Motion by two routes with its error bars, which all truths of a mechanism give; records made comparable."""
+"""Motion by two routes with its error bars, which all truths of a mechanism give, and its early end.
+
+That is the earliest of its routes' failures and of broken checks, with its reason. Records are made comparable.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.bounces import Bounce
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.dynamics.link_forces import link_values
 from proofroll.elements.mechanism.dynamics.placed import Placed
 from proofroll.elements.mechanism.dynamics.record import Record, record_of
@@ -20,11 +25,15 @@ from proofroll.elements.mechanism.scene.joint_kinds import WITH_QUATERNION, Join
 from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.truth import SAFETY
 from proofroll.truth.check.laws.tiles import Tiles
+from proofroll.truth.numerics.hybrid import HybridPath, Stretch
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
     from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 
+_Path = HybridPath[Stretch[ContactMode]]
+_T = TypeVar("_T")
+_TIME = re.compile(r" (?:at|near|by|before) t = [\d.e+-]+ s\b")  # of a failure, in its message
 NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: the smallest difference that a scene file can express
 SAME_START = 1e-9  # m, 1: round-off of positions is 1e-15 of them, the error of a wrong formula far larger
 ROUND_OFF = 16 * float(np.finfo(float).eps)  # relative round-off after some ten operations
@@ -37,7 +46,8 @@ class Routed(NamedTuple):
     Attributes:
         record: the motion.
         works: work of drives since the start [J], (times, drives).
-        pressed: contact forces [N] and moments against turning [N m], (times, contacts, 6); None: no contacts.
+        pressed: contact forces [N], moments against turning [N m] and normal forces [N] where components of a force are
+            not determinate, (times, contacts, 7); None: no contacts.
         sums: sums of the forces [N], (times, sums, 3); None: as ``pressed``.
     """
 
@@ -66,8 +76,7 @@ class TwoRouteMotion:
         reason: cause why the question is ill-posed from the horizon on.
         end: time from which the motion is not known, s; the record ends before it; inf: it reaches all times asked for.
         ended: reason why it ends there, as a clause.
-        pressed: contact forces [N] and moments against turning [N m] on the first bodies, (times, contacts, 6), NaN
-            where not determinate; None: no contacts.
+        pressed: as of :class:`Routed`, on the first bodies, NaN where not determinate.
         sums: sums of the forces, (times, sums, 3); None: as ``pressed``.
         works: work of drives since the start [J], (times, drives).
         laws: outcome of the law check, as a clause; empty: it ended the motion, or there was none.
@@ -172,3 +181,89 @@ def largest(values: Array) -> Array:
     """Largest absolute value at each time, without NaN, (times)."""
     flat = np.abs(values.reshape(len(values), -1))
     return np.asarray(np.where(np.isnan(flat), 0.0, flat).max(axis=1, initial=0.0), dtype=np.float64)
+
+
+class EarlyEnd:
+    """Earliest time from which a motion is not known, and why.
+
+    Attributes:
+        time: [s]; inf: none.
+        reason: a clause without that time.
+    """
+
+    def __init__(self) -> None:
+        self.time, self.reason = float(np.inf), ""
+
+    def at(self, time: float, reason: str) -> None:
+        """Records an end, unless an earlier one is known; times in the reason are left out, for the end has one."""
+        if time < self.time:
+            self.time, self.reason = time, _TIME.sub("", reason)
+
+    def known(self, times: Array) -> Array:
+        """Times of rising ones [s] that lie before the end.
+
+        Raises:
+            Diverged: there is none.
+        """
+        if not times[0] < self.time:
+            raise Diverged(self.reason, self.time)
+        return np.asarray(times[times < self.time])
+
+    def run(self, route: Callable[[Array], _T], times: Array) -> _T:
+        """Result of a route at the known ones of some times [s]; where it fails is an end.
+
+        Raises:
+            Diverged: none of these times is known, or the route fails at a time that it does not tell.
+        """
+        while True:
+            try:
+                return route(self.known(times))
+            except Diverged as stopped:
+                if stopped.time is None or not 0.0 < stopped.time < self.time:
+                    raise
+                self.at(stopped.time, str(stopped))
+
+
+def cut_at(path: _Path, end: float, text: str) -> _Path:
+    """Path up to a time, and the reason why it ends there."""
+    kept = [stretch for stretch in path.stretches if stretch.start < end]
+    last = kept[-1]
+    if last.end > end:
+        kept[-1] = replace(last, end=end, guard=None)
+    return replace(
+        path,
+        stretches=tuple(kept),
+        happenings=tuple(item for item in path.happenings if item.time < end),
+        margins=tuple(item for item in path.margins if item[0] < end),
+        known=False,
+        ended=text,
+        transitions=path.transitions[: len(kept)],
+    )
+
+
+def cut_motion(motion: TwoRouteMotion, end: float, text: str) -> TwoRouteMotion:
+    """Motion before a time [s], and the reason why it ends there.
+
+    Raises:
+        Refused: no sample lies before it.
+    """
+    count = int(np.sum(motion.record.time < end))
+    if not count:
+        raise Refused(text)
+
+    def first(values: Array | None) -> Array | None:
+        return None if values is None else values[:count]
+
+    return replace(
+        motion,
+        record=motion.record.first(count),
+        bars={name: bar[:count] for name, bar in motion.bars.items()},
+        events=tuple(event for event in motion.events if event.time < end),
+        bounces=tuple(bounce for bounce in motion.bounces if bounce.time < end),
+        end=end,
+        ended=text,
+        laws="",
+        pressed=first(motion.pressed),
+        sums=first(motion.sums),
+        works=first(motion.works),
+    )

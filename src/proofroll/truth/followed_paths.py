@@ -233,7 +233,8 @@ def _fields(mechanism: Mechanism, motion: Routed, determinate: NDArray[np.bool_]
     fields = fields_with_bars(mechanism, _masked(motion, determinate)) | {"work": motion.works}
     if motion.pressed is None or motion.sums is None:
         return fields
-    return fields | {"pressed": motion.pressed[..., :3], "turning": motion.pressed[..., 3:], "sums": motion.sums}
+    forces, turning = motion.pressed[..., [0, 1, 2, 6]], motion.pressed[..., 3:6]
+    return fields | {"pressed": forces, "turning": turning, "sums": motion.sums}
 
 
 def _left_by_a_cut(
@@ -306,14 +307,20 @@ def at_times(
     """Numbers of a path's stretches at times in natural units, near the given ones and of the same kinds of mode.
 
     A route may divide what the other follows in one stretch at another time, as the beginning of a slip. No time is
-    taken across a jump of the state, as at an impact, where both routes give the value on the same side.
+    taken across a jump of the state, as at an impact, or across a turn of a slip, where both routes give the value on
+    the same side.
     """
-    states = []
+
+    def passes(number: int) -> bool:
+        """True if nothing but the time divides a stretch from the next one."""
+        return path.stretches[number].end not in turns and _goes_on(path.stretches[number:], kinds)
+
+    states, turns = [], {item.time for item in path.happenings if item.kind == EventKind.TURN}
     for number, time in zip(stretches, times, strict=True):
         near = number
-        while near > 0 and time <= path.stretches[near].start and _goes_on(path.stretches[near - 1 :], kinds):
+        while near > 0 and time <= path.stretches[near].start and passes(near - 1):
             near -= 1
-        while time >= path.stretches[near].end and _goes_on(path.stretches[near:], kinds):
+        while time >= path.stretches[near].end and passes(near):
             near += 1
         states.append(near)
     return states

@@ -39,6 +39,7 @@ _BARS = {
     "hop_speed": "slip", "energy_gain": "energy", "bushing_forces": "links", "bushing_torques": "links",
 }  # fmt: skip
 _LEAST = 1e-3  # natural lengths that count as a motion, however little moves
+_VAGUE = 0.1  # natural times that the bracket of an event exceeds where routes part
 _PARTED = 1e-3  # part of the motion that a bar exceeds from where routes part
 _POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
 _PREFIXES = {"work.": "work", "net_": "sums", "q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
@@ -58,7 +59,7 @@ class MechanismTruth:
         """See :func:`proofroll.truth.truth_of_mechanism.truth_of`; of motions that are not unique, laws alone."""
         # imports of a third of a second, which what has another truth does not need
         from proofroll.truth.check.answer import held_answer
-        from proofroll.truth.early_end import cut_motion
+        from proofroll.truth.error_bars import cut_motion
         from proofroll.truth.smooth.smooth_truth import branching
         from proofroll.truth.truth_of_mechanism import truth_of
 
@@ -167,29 +168,30 @@ def _columns(element: MechanismElement, motion: TwoRouteMotion | Routed) -> Colu
     """Variables of a motion."""
     record, placed = motion.record, motion.record.placed(element.mechanism)
     wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
-    borne = np.zeros((len(record.time), 0, 6)) if motion.pressed is None else motion.pressed
-    return columns(
-        element, placed, wrench, borne[..., :3], record.named, motion.sums, UNDETERMINED, motion.works, borne[..., 3:]
-    )
+    borne = np.zeros((len(record.time), 0, 7)) if motion.pressed is None else motion.pressed
+    return columns(element, placed, wrench, borne, record.named, motion.sums, UNDETERMINED, motion.works)
 
 
 def _unknown_from(element: MechanismElement, motion: TwoRouteMotion) -> tuple[float, str] | None:
-    """Time [s] from which routes part before a horizon, so far that the bar exceeds all motion, with a sentence.
+    """Time [s] from which routes part before a horizon, so far that a bar tells nothing, with a sentence.
 
     None: they do not.
     """
+    ends = [
+        (event.time_low, f"the two routes part, and tell {event.kind} of {event.name} {width:.2g} s apart")
+        for event in motion.events
+        if (width := event.time_high - event.time_low) > _VAGUE * element.length / element.speed
+    ]
     moved = np.abs(motion.record.p_WB - element.start.p_WB[:1]).reshape(len(motion.record.time), -1).max(1)
     size = np.maximum(np.maximum.accumulate(moved), _LEAST * element.length)
     bar, told = motion.bars["p_WB"], motion.record.time < motion.horizon
     beyond = np.flatnonzero((bar > size) & told)
-    if not beyond.size:
-        return None
-    number = int(np.flatnonzero((bar > _PARTED * size) & told)[0])
-    text = (
-        f"the two routes part, and the error bar of places grows to {bar[beyond[0]]:.2g} m, more than anything has "
-        "moved; please report it"
-    )
-    return float(motion.record.time[number]), text
+    if beyond.size:
+        number, widest = int(np.flatnonzero((bar > _PARTED * size) & told)[0]), f"{bar[beyond[0]]:.2g} m"
+        text = f"the two routes part, and the error bar of places grows to {widest}, more than anything has moved"
+        ends.append((float(motion.record.time[number]), text))
+    time, text = min(ends, default=(np.inf, ""))
+    return (time, f"{text}; please report it") if time < motion.horizon else None
 
 
 def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:

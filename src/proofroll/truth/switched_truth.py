@@ -19,7 +19,6 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
 from proofroll.elements.mechanism.contact.modes import REST, Acting, ContactMode
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
-from proofroll.elements.mechanism.dynamics.analysis import RANK
 from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
 from proofroll.elements.mechanism.dynamics.placed import Placed
@@ -34,8 +33,7 @@ from proofroll.truth.bodies.contact_bodies import ContactBodies
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.check.held_to_laws import held_to_laws, of_bodies, of_tree, work_along
-from proofroll.truth.early_end import cut_at
-from proofroll.truth.error_bars import ROUND_OFF, Routed, TwoRouteMotion, check_start, on_same_turns
+from proofroll.truth.error_bars import ROUND_OFF, Routed, TwoRouteMotion, check_start, cut_at, on_same_turns
 from proofroll.truth.followed_paths import (
     CLOSE,
     TOLERANCES,
@@ -91,9 +89,8 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     plain = [values.own for values in held_paths] or [scaled, scaled]
     dynamics, second = ContactDynamics(plain[0]), MaximalCoordinates(plain[1])
     check_start(dynamics.equations, second, units.length)
-    size = _size(dynamics)
-    tree, equations = ContactTree(dynamics, TOLERANCES[0], size), ContactEquations(plain[1], second.lean)
-    bodies = ContactBodies(equations, TOLERANCES[1], size)
+    size, equations = _size(dynamics), ContactEquations(plain[1], second.lean)
+    tree, bodies = ContactTree(dynamics, TOLERANCES[0], size), ContactBodies(equations, TOLERANCES[1], size)
     tree.faces = bodies.faces = faces
     until, breaking, kinds = float(times[-1]), breaks(scaled.signals), partial(_kinds, dynamics)
     paths, routes = _followed(tree, bodies, held_paths, until, breaking)
@@ -299,7 +296,8 @@ def _in_si(mechanism: Mechanism, units: Units, routed: Routed, times: Array | No
     record, moment = units.record(mechanism, natural), units.force * units.length
     if routed.pressed is None:
         return routed._replace(record=record)
-    pressed, count = routed.pressed * np.repeat([units.force, moment], 3), len(contact_sums(mechanism.contacts))
+    sizes, count = np.array([*[units.force] * 3, *[moment] * 3, units.force]), len(contact_sums(mechanism.contacts))
+    pressed = routed.pressed * sizes
     if routed.sums is None:
         return routed._replace(record=record, pressed=pressed, sums=_sums_along(record.placed(mechanism), pressed))
     is_moment = np.arange(routed.sums.shape[1]) >= count
@@ -316,8 +314,7 @@ def _shared_load(dynamics: ContactDynamics, path: _Path, time: float) -> str:
     stretch = path.stretches[path.stretch_at(np.array([time]))[0]]
     q, v, begun = dynamics.parts(stretch.first)
     solution = dynamics.solve(q, v, stretch.mode, begun)
-    pairs = zip(dynamics.contacts, solution.determinate, solution.state.touching, strict=True)
-    sharing = [contact for contact, determinate, touch in pairs if not determinate[np.abs(touch.normal) > RANK].all()]
+    sharing = [contact for contact, N in zip(dynamics.contacts, solution.normal_forces, strict=True) if np.isnan(N)]
     if not sharing:
         return ""
     names = dict.fromkeys(contact.name for contact in sharing)

@@ -7,13 +7,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from proofroll.core.errors import InputError
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.drives import Actuator
 from proofroll.elements.mechanism.scene.kinks import held_sides
 from proofroll.elements.mechanism.scene.parts import Force, Spring
-from proofroll.elements.mechanism.scene.signal import Formula
+from proofroll.elements.mechanism.scene.signal import Formula, Table
 from proofroll.elements.mechanism.scene.spring_law import SpringLaw
+from proofroll.files.scene_file import load_scene
 from proofroll.truth.switching import contact_taylor
 from proofroll.truth.switching.kink_sides import sides_ahead
 from proofroll.truth.truth_of_mechanism import truth_of
@@ -152,3 +156,41 @@ def test_a_prescribed_motion_starts_on_the_side_to_which_time_goes():
     assert found.record.q[:, 0] == pytest.approx(0.1 * np.sin(3 * np.array([0.0, 0.5, 1.0])), abs=1e-13)
     assert found.end == pytest.approx(np.pi / 3, rel=1e-9)
     assert "jumps in its rate" in found.ended
+
+
+STEPS = (
+    Table((0.0, 0.3), (0.0, 2.0), hold=True),
+    Table((0.0, 0.3, 0.30001), (1.0, 1.0, 2.0)),
+    Formula("sign(t - 0.3)"),
+    Formula("max(t - 0.3, 0)"),
+)
+DRIVES = {
+    "load of a joint": lambda step: slider(joint={"torque": step}),
+    "target": lambda step: slider(actuators=(Actuator("a", "x", "position", step, kp=4.0, kd=0.1),)),
+    "force": lambda step: slider(forces=(Force("push", "m", "force", (step, 0.0, 0.0)),)),
+}
+
+
+@pytest.mark.parametrize(
+    "drive", ["load of a joint", *(pytest.param(name, marks=pytest.mark.nightly) for name in ("target", "force"))]
+)
+@pytest.mark.parametrize("step", STEPS, ids=["held", "ramp", "sign", "max"])
+def test_a_truth_tells_when_its_drives_jump(drive, step):
+    """Where a load or a target has a step or a corner the truth has a border, and nowhere else."""
+    element = MechanismElement(DRIVES[drive](step))
+    found = truth(Scene("stepped", "", (element,)), np.linspace(0.0, 0.5, 6))
+    corners = [0.3, 0.30001] if isinstance(step, Table) and not step.hold else [0.3]
+    assert found.attrs["borders"] == pytest.approx(corners, abs=1e-12)
+
+
+@pytest.mark.nightly
+def test_borders_of_all_elements_are_told():
+    """The truth of a loaded slide beside a ball that comes to roll has the borders of both."""
+    slide = MechanismElement(slider(joint={"torque": Table((0.0, 0.1), (0.0, 2.0), hold=True)}))
+    ball = load_scene("slide_to_roll")
+    both, alone = (
+        truth(Scene("both", "", elements), np.linspace(0.0, 0.4, 5)).attrs["borders"].tolist()
+        for elements in ((slide, *ball.elements), ball.elements)
+    )
+    assert alone != []
+    assert both == [0.1, *alone]

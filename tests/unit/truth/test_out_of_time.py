@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import ended_early
 from proofroll.core.pace import PACE
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism.dynamics.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.dynamics.record import Record
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import EngineFacts, Result, Status
@@ -22,6 +25,7 @@ from proofroll.running.run_case import run
 from proofroll.running.store import Store
 from proofroll.studies.cases import case_of
 from proofroll.truth.bodies.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.check import held_to_laws
 
 TIMES = np.linspace(0.0, 1.0, 101)
 
@@ -101,3 +105,39 @@ def test_a_truth_that_was_cut_is_not_stored(tmp_path: Path) -> None:
     assert ended_early(store.stored(case).dataset) is not None  # for who asked
     store.put(case, dataclasses.replace(result, cut=False))
     assert store.get(case) is not None
+
+
+CHECKS = {
+    "transitions": ("bouncing_ball", {"restitution": 0.7}, held_to_laws, "transition", 3.0),
+    "witness of a closed form": ("four_bar", {}, JointCoordinates, "rk4_states", 0.1),
+}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("check", CHECKS)
+def test_a_check_is_within_the_limit(check: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A truth ends, with its true reason, where its limit ends what it is checked by; what came before is as it was."""
+    name, parameters, owner, function, seconds = CHECKS[check]
+    scene, times, clock, plain = load_scene(name, **parameters), 2 * TIMES, [0.0], getattr(owner, function)
+    whole = truth(scene, times)
+    assert ended_early(whole) is None
+
+    def slow(run: Callable[..., Any], *given: Any, **named: Any) -> Any:
+        clock[0] += seconds
+        return run(*given, **named)
+
+    def slow_states(equations: JointCoordinates, *given: Any) -> Iterator[Any]:
+        yield from (slow(lambda state: state, state) for state in plain(equations, *given))
+
+    slowed = {"rk4_states": slow_states}.get(function, partial(slow, plain))
+    monkeypatch.setattr("proofroll.core.pace.time.process_time", lambda: clock[0])
+    monkeypatch.setattr(owner, function, slowed)
+    with PACE.limited(10.0):
+        cut = truth(scene, times)
+    count, (end, reason) = len(cut.time), ended_early(cut) or (0.0, "")
+    assert PACE.over
+    assert reason == "its limit of 10 s of processor time was reached"
+    assert 0 < count < len(times)
+    assert cut.time[-1] < end <= times[count]
+    assert clock[0] <= 12.0
+    np.testing.assert_array_equal(cut["positions"], whole["positions"][:count])

@@ -56,6 +56,21 @@ def bar(found: Any, field: str) -> float:
     return float(np.max(found[field].attrs["error_bar"]))
 
 
+@pytest.mark.nightly
+@pytest.mark.parametrize("slope", [0.0, 0.1])
+def test_a_ball_that_slides_without_rolling_has_compiled_modes(slope: float) -> None:
+    """Rolling resistance above what friction of its slip can turn holds the ball: it slides as a box, to its stop."""
+    pytest.importorskip("heyoka")
+    pair, times = law(0.3, rolling_resistance=0.02), np.linspace(0.0, 0.4, 5)
+    found = truth(ball(pair, (1.2, 0.0, 0.0, 0.0, 0.0, 0.0), slope=slope), times)
+    slows = G * (0.3 * math.cos(slope) - math.sin(slope))
+    left = np.minimum(times, 1.2 / slows)
+    assert at(found, "p_WB")[:, 0] == pytest.approx(1.2 * left - slows * left**2 / 2, abs=1e-13)
+    assert np.abs(at(found, "w_WB")).max() < 1e-13
+    assert at(found, "torque.contact.y")[1, 0] == pytest.approx(-0.3 * MASS * G * math.cos(slope) * RADIUS, abs=1e-12)
+    assert "DOP853" not in found.attrs["route"] + found.attrs["second_route"]
+
+
 @pytest.mark.drill
 def test_a_spin_ends_when_its_friction_says() -> None:
     """A ball that spins about the normal slows by f N/J and stands after J ω/(f N)."""

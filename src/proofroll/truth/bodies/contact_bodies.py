@@ -411,14 +411,14 @@ class ContactBodies(ContactStretches):
         return min(normal / size_f, float(np.dot(acting.heading, solution.slide[k])) / size_s)
 
     def forces(self, state: Array, mode: ContactMode) -> tuple[Array, Array]:
-        """Forces and moments of contacts, and wrenches on the bodies; see :meth:`.ContactEquations.applied`."""
+        """Forces of contacts, and wrenches on the bodies; see :meth:`.ContactEquations.applied`."""
         bodies = self.equations.at(self.equations.equations.normalised(state), features_of(mode))
         return self.equations.applied(bodies, self.equations.accelerated(bodies, mode).force)
 
     def recorded(
         self, second: MaximalCoordinates, times: Array, states: Array, modes: Iterable[ContactMode]
     ) -> tuple[Record, Array]:
-        """Record at times, by rows of all joints, and forces and moments of contacts, (times, contacts, 6)."""
+        """Record at times, by rows of all joints, and forces, moments and N of contacts, (times, contacts, 7)."""
         samples = [  # one after the other, for the last states are kept
             (*self.forces(state, mode), self.equations.switched(state, mode))
             for state, mode in zip(states, modes, strict=True)

@@ -19,18 +19,22 @@ from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, m
 from proofroll.truth.switching.contact_symbols import (
     ScalarTouch,
     SolvedSymbols,
+    TurningMoments,
     Vector,
     floats,
     kink_guards,
     known_shapes,
     limited,
     of_joint,
+    of_turning,
+    opposed_rates,
+    resisted,
+    resisted_rate,
     rows_of,
     scalar_motion,
     touch_in_scalars,
     worth_compiling,
 )
-from proofroll.truth.switching.turning_symbols import TurningMoments, of_turning, opposed_rates, resisted, resisted_rate
 
 
 class _Now(NamedTuple):

@@ -342,7 +342,7 @@ class ContactEquations:
         )
 
     def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
-        """Forces and moments of contacts, (contacts, 6), and wrenches on bodies about centres of mass, (bodies, 6)."""
+        """Forces, moments and N of contacts, (contacts, 7), and wrenches on bodies about their centres, (bodies, 6)."""
         moments = force[len(force) - len(self._turning) :]
         wrenches, force = np.zeros((len(self.mechanism.bodies) + 1, 6)), force[: len(self.pairs)]
         for pair, point, push in zip(self.pairs, state.touching, force, strict=False):
@@ -351,7 +351,8 @@ class ContactEquations:
         for friction, moment in zip(self._turning, moments, strict=True):
             for body, sign in zip(self.pairs[friction.pressed_by], (1.0, -1.0), strict=True):
                 wrenches[body, 3:] += sign * moment
-        return with_moments(force, self._turning, moments), wrenches[:-1]
+        normals = np.array([touch.normal for touch in state.touching[: len(force)]]).reshape(-1, 3)
+        return with_moments(force, self._turning, moments, np.einsum("ki,ki->k", normals, force)), wrenches[:-1]
 
     def rate(self, state: Array, mode: ContactMode) -> Array:
         """Time derivative of a state in a mode."""

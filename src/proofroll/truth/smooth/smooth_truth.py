@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import uneven
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.pace import PACE
+from proofroll.core.pace import PACE, OutOfTime
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.modes import ContactMode
 from proofroll.elements.mechanism.contact.start import natural_scale
@@ -31,9 +31,9 @@ from proofroll.truth import SAFETY
 from proofroll.truth.bodies.contact_equations import ContactEquations
 from proofroll.truth.bodies.maximal_coordinates import BESIDE, MaximalCoordinates
 from proofroll.truth.check.held_to_laws import of_bodies, of_tree, tiles_of
-from proofroll.truth.early_end import EarlyEnd
 from proofroll.truth.error_bars import (
     NUDGE,
+    EarlyEnd,
     Routed,
     TwoRouteMotion,
     check_start,
@@ -205,12 +205,21 @@ class _SmoothTruth:
         return end, by_tree.ended if alike else reason
 
     def _by_form(self, form: ClosedForm) -> TwoRouteMotion:
-        """Motion in closed form where routes fail; equal steps in joint coordinates are its witness."""
-        step = max(_WITNESS_STEP, self._until / _MOST_STEPS)
-        states = self._equations.rk4_states(self._times, step)
+        """Motion in closed form where routes fail, as far as its witness comes: equal steps in joint coordinates."""
+        states, step, seconds = list[Array](), max(_WITNESS_STEP, self._until / _MOST_STEPS), self._seconds
+        try:
+            PACE.follow("witness", self._until)
+            for state in self._equations.rk4_states(self._times, step):
+                states.append(state)
+        except OutOfTime:
+            if not states:
+                raise
+        finally:
+            PACE.leave()
+        count = len(states)
+        self._times, self._seconds, self._until = self._times[:count], seconds[:count], float(self._times[count - 1])
         witness = self._in_seconds(self._equations.recorded(self._times, states))
         exact = on_same_turns(self._mechanism, witness, self._from_form(form, self._seconds))
-        count = len(self._times)
         edges = np.linspace(0.0, self._until, int(np.ceil(self._until / _FORM_STEP)) + 1).tolist()
         path, unknown = self._path_of_form([*pairwise(edges)]), np.full((count, len(working(self._mechanism))), np.nan)
         motion = two_route_motion(
@@ -223,7 +232,8 @@ class _SmoothTruth:
             left=dict.fromkeys(_apart_in_fields(self._mechanism, exact, exact), np.zeros(count)),
         )
         tiles = tiles_of(of_tree(self._mechanism, self._units, self._tree, path), self._until)
-        return replace(motion, branches=self._branches(), tiles=tiles)
+        end, ended = (float(seconds[count]), PACE.reason) if count < len(seconds) else (np.inf, "")
+        return replace(motion, branches=self._branches(), tiles=tiles, end=end, ended=ended)
 
     def _branches(self) -> list[float]:
         """Times of singular poses along the closed form [s]."""

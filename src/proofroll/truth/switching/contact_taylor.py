@@ -41,7 +41,6 @@ from proofroll.truth.switching.contact_symbols import (
     turning_slip,
 )
 from proofroll.truth.switching.planar_slip import Led, LedValues
-from proofroll.truth.switching.turning_symbols import follows
 
 # Part of the way to a place where the rates have a kink, as at the tip of a cone: a step across it has no series.
 _BEFORE = 0.99
@@ -136,7 +135,7 @@ class CompiledModes:
 
         None: heyoka is missing, or a part of the mechanism has no rule in symbols.
         """
-        if not self._covers or not follows(mode, self._contacts):
+        if not self._covers:
             return None
         key = tuple((acting.kind, acting.along is not None, acting.leads, acting.feature) for acting in mode)
         if key not in self._modes:

@@ -18,9 +18,8 @@ from proofroll.core.truth import truth
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.check.answer import held_answer
-from proofroll.truth.early_end import cut_motion
-from proofroll.truth.error_bars import TwoRouteMotion
-from proofroll.truth.plug_in import MechanismTruth
+from proofroll.truth.error_bars import TwoRouteMotion, cut_motion
+from proofroll.truth.plug_in import MechanismTruth, _unknown_from
 from proofroll.truth.truth_of_mechanism import truth_of
 
 Array = NDArray[np.float64]
@@ -128,6 +127,12 @@ FAULTS: list[tuple[str, str, Change]] = [
     ("events 1e-9 s early", "bouncing_ball", plus(-1e-9, *EVENTS)),
     ("a change of mode 1e-7 s late", "slide_to_roll", plus(1e-7, *EVENTS)),
     ("no first event", "stop", of_events(lambda events: events.isel(event=slice(1, None)))),
+    (
+        "no turns of a joint",
+        "spring_friction",
+        of_events(lambda events: events.isel(event=events.event_kind != "turn")),
+    ),
+    ("no turn of a contact", "falling_rod", of_events(lambda events: events.isel(event=events.event_kind != "turn"))),
     ("an impact told as a stick", "stop", values(lambda item: np.full(item.shape, "stick"), "event_kind")),
     ("an event at a fifth of its time", "stop", times(0.2, *EVENTS)),
     ("energy before an impact off by 1e-9", "bouncing_ball", times(1 + 1e-9, "event_energy_before")),
@@ -254,9 +259,22 @@ def test_a_broken_law_ends_a_truth_and_keeps_what_lies_before(monkeypatch: pytes
 
 def test_a_bar_is_the_largest_over_the_times() -> None:
     """Forces, whose bars rise and fall, have the largest of all samples, not that of the last."""
-    _, motion, dataset = answer("slide_to_roll")
-    assert dataset["contact_forces"].attrs["error_bar"] == motion.bars["pressed"].max()
-    assert motion.bars["pressed"].max() > motion.bars["pressed"][-1]
+    element, motion, _ = answer("slide_to_roll")
+    bar = motion.bars["pressed"].copy()
+    bar[5] = 2 * bar.max()
+    dataset = MechanismTruth._dataset(element, replace(motion, bars=motion.bars | {"pressed": bar}), "")
+    assert dataset["contact_forces"].attrs["error_bar"] == bar[5]
+
+
+@pytest.mark.parametrize("wide", [1e-6, 0.2])
+def test_a_truth_ends_before_an_event_that_its_routes_tell_far_apart(wide: float) -> None:
+    """A bracket of a fifth of the natural time says that routes part; one of 1e-6 is a bar."""
+    element, motion, _ = answer("stop")
+    (event, *others), width = motion.events, wide * element.length / element.speed
+    event = replace(event, time_low=event.time - width / 2, time_high=event.time + width / 2)
+    found = _unknown_from(element, replace(motion, events=(event, *others)))
+    text = f"the two routes part, and tell {event.kind} of {event.name} {width:.2g} s apart; please report it"
+    assert found == ((event.time_low, text) if wide == 0.2 else None)
 
 
 def test_a_motion_is_cut_with_its_events_and_bars() -> None:

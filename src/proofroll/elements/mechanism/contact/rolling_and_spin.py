@@ -142,11 +142,11 @@ def turning_frictions(contacts: Sequence[BodyContact]) -> tuple[TurningFriction,
     return tuple(laws)
 
 
-def with_moments(forces: Array, frictions: Sequence[TurningFriction], moments: Array) -> Array:
-    """Forces of contacts [N], (contacts, 3), and the sum of the moments of their frictions [N m], (contacts, 6)."""
-    borne = np.concatenate([forces, np.zeros_like(forces)], axis=1)
+def with_moments(forces: Array, frictions: Sequence[TurningFriction], moments: Array, normal_forces: Array) -> Array:
+    """Forces of contacts, (contacts, 3), the sums of the moments of their frictions, and N, (contacts, 7) [N, N m]."""
+    borne = np.concatenate([forces, np.zeros_like(forces), normal_forces[:, None]], axis=1)
     for friction, moment in zip(frictions, moments, strict=True):
-        borne[friction.pressed_by, 3:] += moment
+        borne[friction.pressed_by, 3:6] += moment
     return borne
 
 

@@ -91,11 +91,20 @@ class ContactSolution:
         """True for each determinate component of ``force``, (contacts, 3)."""
         return np.asarray(np.abs(self.undetermined).max(axis=2, initial=0.0) <= RANK)
 
+    @cached_property
+    def _normals(self) -> Array:
+        return np.array([touch.normal for touch in self.state.touching]).reshape(-1, 3)
+
     @property
     def splits(self) -> Array:
         """Changes of the normal forces with the ways to split a load, (contacts, ways)."""
-        normals = np.array([touch.normal for touch in self.state.touching]).reshape(-1, 3)
-        return np.asarray(np.einsum("ki,kiw->kw", normals, self.shifts))
+        return np.asarray(np.einsum("ki,kiw->kw", self._normals, self.shifts))
+
+    @property
+    def normal_forces(self) -> Array:
+        """Normal force of each contact [N], (contacts), whatever its axes are; NaN where it is not determinate."""
+        shared = np.abs(self.splits).max(axis=1, initial=0.0) > RANK
+        return np.where(shared, np.nan, np.einsum("ki,ki->k", self._normals, self.force))
 
     def lasts(self, mode: ContactMode) -> float:
         """Time until one of the first contacts that is open closes at constant acceleration [s]; infinite: never."""

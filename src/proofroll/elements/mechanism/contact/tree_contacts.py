@@ -435,8 +435,8 @@ class ContactDynamics:
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array, Array]:
         """Fields of a record at one time [s], forces and moments of contacts between bodies, and sums of the forces.
 
-        Forces [N] and moments against turning [N m], (contacts, 6), and the :func:`contact_sums` [N] with the
-        :func:`contact_moments` [N m], (sums, 3), are NaN where they are not determinate.
+        Forces [N], moments against turning [N m], normal forces [N] where that of components is not, (contacts, 7), and
+        the :func:`contact_sums` [N] with the :func:`contact_moments` [N m], (sums, 3), are NaN if not determinate.
         """
         solution, count = self.solve(q, v, mode, time), len(self._bodies)
         joints = mode_of_joints(self.equations.switched, self.contacts, mode)
@@ -463,7 +463,9 @@ class ContactDynamics:
         moved = np.abs(summed(np.moveaxis(solution.undetermined, 2, 0))).max(axis=0, initial=0.0)
         sums = np.where(moved <= RANK, summed(pressed), np.nan)
         forces = np.where(solution.determinate, solution.force, np.nan)
-        return fields, with_moments(forces[:count], self.turning, forces[count + len(self._of_joints) :]), sums
+        N = np.where(solution.determinate.all(axis=1), np.nan, solution.normal_forces)  # the whole force tells it
+        moments = forces[count + len(self._of_joints) :]
+        return fields, with_moments(forces[:count], self.turning, moments, N[:count]), sums
 
     def _borne(self, state: ContactsNow, shift: Array) -> Array:
         """Part of a change of all forces, (contacts, 3), that friction against turning can bear about its axes."""

@@ -36,8 +36,8 @@ def has_held(mechanism: Mechanism) -> bool:
 
 
 def same_instant(time: float, rival: float) -> bool:
-    """True if two times [s] are one, to the round-off of their computation."""
-    return abs(time - rival) <= _SAME * max(abs(rival), _STARTS)
+    """True if two times [s] are one, to the round-off of their computation; no time is inf, which comes never."""
+    return math.isclose(time, rival, rel_tol=_SAME, abs_tol=_SAME * _STARTS)
 
 
 def with_values(mechanism: Mechanism, values: Sequence[Any]) -> Mechanism:

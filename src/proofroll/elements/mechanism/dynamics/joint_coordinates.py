@@ -15,6 +15,7 @@ import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.pace import PACE
 from proofroll.elements.mechanism.dynamics.analysis import BRANCHES, RANK, RowSign, analyse, lacks_inertia, reactions
 from proofroll.elements.mechanism.dynamics.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.dynamics.named_forces import joint_force_shares, lengths, pick_named
@@ -292,12 +293,16 @@ class JointCoordinates:
         """States (q, v) at the given times [s], by Runge-Kutta 4 in equal steps of at most ``step`` [s].
 
         Fixed steps pass singular poses, where adaptive steps would shrink to zero.
+
+        Raises:
+            OutOfTime: the truth that follows them has taken its processor time.
         """
         y, now = np.concatenate(self.mechanism.start()), 0.0
         for time in times:
             steps = int(np.ceil((time - now) / step - 1e-9))
             h = (time - now) / max(steps, 1)
             for t in (now + h * number for number in range(steps)):
+                PACE.reached(t)
                 k1 = self.rate(t, y)
                 k2 = self.rate(t + h / 2, y + h / 2 * k1)
                 k3 = self.rate(t + h / 2, y + h / 2 * k2)

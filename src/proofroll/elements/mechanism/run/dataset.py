@@ -136,15 +136,14 @@ def columns(
     sums: FloatArray | None = None,
     unsaid: str = UNSAID,
     work: FloatArray | None = None,
-    moments: FloatArray | None = None,
 ) -> Columns:
     """Variables of a run, from the motion of the bodies and the forces and moments on them.
 
-    ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3);
+    ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts on their first bodies,
+    (time, contacts, 3), or if known with moments against turning [N m] and normal forces [N], (time, contacts, 7);
     ``sums``: of forces of contacts by :func:`.contact_sums`, then their moments by :func:`.moments_along`,
-    (time, sums, 3), by default from ``pressed``;
-    ``unsaid``: reason of what is NaN at the last time; ``work``: of drives [J], (time, drives), by default summed over
-    the samples; ``moments``: against turning, of contacts on their first bodies [N m], (time, contacts, 3), if known;
+    (time, sums, 3), by default from ``pressed``; ``unsaid``: reason of what is NaN at the last time;
+    ``work``: of drives [J], (time, drives), by default summed over the samples;
     ``named``: see :func:`~proofroll.elements.mechanism.dynamics.named_forces.named_forces`, (time, forces).
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
@@ -198,7 +197,7 @@ def columns(
             meaning = f"determinate components of the {kind}s on children"
             put(f"{kind}s", values[:, mask], unit, meaning, f"{kind}_component")
     if mechanism.contacts:
-        _put_contacts(element, placed, (pressed, moments), sums, unsaid, put)
+        _put_contacts(element, placed, pressed, sums, unsaid, put)
     for values, item in zip(named.T, named_forces(mechanism), strict=True):
         put(item.name, values, str(item.unit), item.meaning, absent=unsaid if np.isnan(values[-1]) else "")
     put_links(placed, named, put, unsaid, work)
@@ -216,7 +215,7 @@ def columns(
             if name in kept:
                 put(name, value, unit, meaning, *(("xyz",) if value.ndim > 1 else ()))
     put("drift", placed.drift(), "m", "how far joints and loops are open")
-    variables |= _local(element, placed, pressed)
+    variables |= _local(element, placed, pressed[..., :3])
     variables |= axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))}
     return Columns(variables, _smallest(variables))
 
@@ -242,16 +241,16 @@ def _local(element: MechanismElement, placed: Placed, pressed: FloatArray) -> di
 def _put_contacts(
     element: MechanismElement,
     placed: Placed,
-    borne: tuple[FloatArray, FloatArray | None],
+    borne: FloatArray,
     sums: FloatArray | None,
     unsaid: str,
     put: Callable[..., None],
 ) -> None:
     """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact, pair and of all together.
 
-    ``borne``: forces, and moments against turning if they are known.
+    ``borne``: forces, moments and normal forces as in :func:`columns`.
     """
-    followed, (pressed, moments) = follow_contacts(placed), borne
+    followed, pressed, moments = follow_contacts(placed), borne[..., :3], borne[..., 3:6]
     contacts = placed.mechanism.contacts
     shared, carried, turned = shared_pairs(contacts), carried_bodies(contacts), turned_bodies(contacts)
     if sums is None:
@@ -282,7 +281,7 @@ def _put_contacts(
     for index, contact in enumerate(placed.mechanism.contacts):
         resists = contact.rolling_resistance or contact.spinning_friction
         of_contact = [("force", "N", "force", pressed)]
-        of_contact += [("torque", "N m", "moment against turning", moments)] if resists and moments is not None else []
+        of_contact += [("torque", "N m", "moment against turning", moments)] if resists and moments.size else []
         for kind, unit, what, values in of_contact:
             for component, letter in zip(values[:, index].T, "xyz", strict=True):
                 absent = unsaid if np.isnan(component[-1]) else ""
@@ -292,12 +291,12 @@ def _put_contacts(
         put(f"slip.{contact.name}", followed.slip[:, index], "m/s", f"speed of slip of {contact.name}")
     put("gaps", followed.gap, "m", "distances between what may touch", "contact")
     put("slips", followed.slip, "m/s", "slip speeds of the contacts", "contact")
-    put("normal_forces", normal_forces(followed, pressed), "N", "normal forces between what may touch", "contact")
+    put("normal_forces", normal_forces(followed, borne), "N", "normal forces between what may touch", "contact")
     put("contact_forces", pressed, "N", "forces between what may touch", "contact", "xyz")
     friction, static = (
         np.array([getattr(contact, name) for contact in placed.mechanism.contacts]) for name in ("friction", "static")
     )
-    left = residuals(followed, pressed, friction, element.force, element.speed, static)
+    left = residuals(followed, borne, friction, element.force, element.speed, static)
     put("unpressed", left["unpressed"], "1", "share of samples so far without a normal force", "contact")
     for name, unit, meaning in RESIDUALS:
         put(name, left[name], unit, meaning, "contact")

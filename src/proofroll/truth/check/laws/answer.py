@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
+from proofroll.truth.check.laws.contacts import slip_of_ball
 from proofroll.truth.check.laws.impacts import held
 from proofroll.truth.check.laws.integrals import cross, integral
-from proofroll.truth.check.laws.joint_forces import law_of, target_of
+from proofroll.truth.check.laws.joints import law_of, target_of
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.motion import Turns, changed_velocity, laws_at_all_times, start_of
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Modes, PublishedEvent, PublishedValues
@@ -38,7 +39,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
     """Checks all events before a ``last`` time [s]."""
     borders = np.flatnonzero(tiles.stretch[1:] != tiles.stretch[:-1])
     ends, begins, jumps = tiles.time[borders, -1], tiles.time[borders + 1, 0], changed_velocity(scene, tiles)[borders]
-    hits = list[PublishedEvent]()
+    hits, slips = list[PublishedEvent](), _slips(scene, tiles)
     for number, end, begin, jump in zip(borders.tolist(), ends.tolist(), begins.tolist(), jumps.tolist(), strict=True):
         if end >= last * (1 - _BEFORE_END):
             continue
@@ -53,9 +54,10 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
         least = STRUCK + _GROWTH * scene.rate * max(begin - end, 0.0)
         if jump > least and not any(item.jumps for item in near):
             residuals.note("change", "a jump of velocities", np.ones((1, 1)), 1.0, time)
-        names = _changed(scene, tiles.modes[number], tiles.modes[number + 1])
-        if names and not any(_of(item.name, name) for item in near for name in names):
-            residuals.note("change", min(names), np.ones((1, 1)), 1.0, time)
+        turned = {name for name, slip in slips if slip[number, -2] @ slip[number + 1, 1] < 0}
+        for names in (_changed(scene, tiles.modes[number], tiles.modes[number + 1]), turned):
+            if names and not any(_of(item.name, name) for item in near for name in names):
+                residuals.note("change", min(names), np.ones((1, 1)), 1.0, time)
         hits += near if jump > least else []
     contacts = {contact.name for contact in scene.contacts if contact.alone}
     for item in published.changes:
@@ -99,6 +101,22 @@ def _changed(scene: LawScene, sooner: Modes, later: Modes) -> set[str]:
         modes = [(item.friction[number], item.stops[number]) for item in (sooner, later)]
         names |= {joint.name} if modes[0] != modes[1] else set()
     return names
+
+
+def _slips(scene: LawScene, tiles: Tiles) -> list[tuple[str, Array]]:
+    """Names of joints and contacts with friction, and what slips in all tiles [m/s, rad/s]; 0 where they stick."""
+    of_joints = [
+        (joint.name, scene.free(number, tiles)[0].rate[..., None], [mode.friction[number] for mode in tiles.modes])
+        for number, joint in enumerate(scene.mechanism.joints)
+        if joint.friction
+    ]
+    of_contacts = [
+        (contact.name, slip_of_ball(contact, tiles), [mode.contacts[k] for mode in tiles.modes])
+        for k, contact in enumerate(scene.contacts)
+        if contact.pair.friction and "sphere" in {contact.shape_a.kind, contact.shape_b.kind}
+    ]
+    slipping = ((name, slip, np.array(modes) == "slip") for name, slip, modes in (*of_joints, *of_contacts))
+    return [(name, slip * slips[:, None, None]) for name, slip, slips in slipping]
 
 
 def works_follow(

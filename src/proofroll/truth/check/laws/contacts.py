@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.truth.check.laws.integrals import cross, dot, norm, turned
+from proofroll.truth.check.laws.integrals import along, cross, dot, norm, turned
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Pieces
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
@@ -42,9 +42,21 @@ def apart(scene: LawScene, contact: PairContact, pieces: BodyPoses, residuals: L
     residuals.note("gap", contact.name, np.maximum(-gap_of(contact, pieces), 0), far, pieces.time)
 
 
-def slide_of(contact: PairContact, pieces: Pieces, place: Array) -> Array:
+def slide_of(contact: PairContact, pieces: BodyPoses, place: Array) -> Array:
     """Velocity of the first body against the second at places [m/s]."""
     return velocity_at(pieces, contact.a, place) - velocity_at(pieces, contact.b, place)
+
+
+def slip_of_ball(contact: PairContact, pieces: BodyPoses) -> Array:
+    """Slip of a ball, a corner or an end on another shape, by poses alone [m/s]."""
+    ball, other, body, base = contact.shape_a, contact.shape_b, contact.a, contact.b
+    if ball.kind != "sphere":
+        ball, other, body, base = other, ball, base, body
+    pose, centre = (pieces.p[..., base, :], pieces.R[..., base, :, :]), pieces.p[..., body, :]
+    centre = centre + turned(pieces.R[..., body, :, :], ball.centre)
+    normal = turned(pose[1], near(other, seen_from(pose, centre))[1])
+    slide = slide_of(contact, pieces, centre - ball.radius * normal)
+    return np.asarray(slide - dot(slide, normal)[..., None] * normal)
 
 
 def contact_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads: BodyLoads) -> None:
@@ -75,7 +87,7 @@ def contact_laws(scene: LawScene, pieces: Pieces, residuals: LawResiduals, loads
 
 def _touch(scene: LawScene, pieces: Pieces, k: int, contact: PairContact) -> ClosedContact:
     normal, force = pieces.normal[..., k, :], pieces.force[..., k, :]
-    slide, pressed = slide_of(contact, pieces, pieces.place[..., k, :]), dot(normal, force)
+    slide, pressed = slide_of(contact, pieces, pieces.place[..., k, :]), along(force, normal)
     ends = contact.a, contact.b
     fast = scene.speed + sum(norm(pieces.v[..., body, :]) for body in ends)
     fast = fast + sum(norm(pieces.w[..., body, :]) for body in ends) * scene.length

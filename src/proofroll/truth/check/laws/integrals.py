@@ -7,6 +7,7 @@ from proofroll.truth.check.laws.record import Array
 
 COUNT = 12  # points of a piece: they resolve a turn of 1 rad to the last digit
 POINTS: Array = -np.cos(np.pi * np.arange(COUNT) / (COUNT - 1))
+IN_PLANE = 1e-12  # component of a unit direction that is round-off
 RESOLVED = 1e-13  # last coefficients of a series, relative to its size, that are round-off
 TO_SERIES: Array = np.linalg.inv(np.asarray(chebyshev.chebvander(POINTS, COUNT - 1), np.float64))
 _INTEGRALS = [chebyshev.chebval(POINTS, chebyshev.chebint(series, lbnd=-1)) for series in np.eye(COUNT)]
@@ -38,6 +39,11 @@ def dot(a: Array, b: Array) -> Array:
 def cross(a: Array, b: Array) -> Array:
     """Vector products, in half the time of numpy's for few vectors."""
     return np.asarray(a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]])
+
+
+def along(vectors: Array, directions: Array) -> Array:
+    """Parts of vectors along unit directions, unknown only where a component that they use is NaN."""
+    return dot(np.where(np.abs(directions) < IN_PLANE, 0.0, vectors), directions)
 
 
 def norm(a: Array) -> Array:

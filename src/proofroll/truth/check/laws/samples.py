@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.truth.check.laws.contacts import contact_laws
-from proofroll.truth.check.laws.integrals import COUNT, cross, dot, norm, turned
+from proofroll.truth.check.laws.integrals import COUNT, IN_PLANE, along, cross, dot, norm, turned
 from proofroll.truth.check.laws.joints import FreeDirection, joint_laws, loop_forces
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, PublishedValues
@@ -23,7 +23,7 @@ NOISE = 60 * COUNT * 3e-14
 _LEAST = 1e-3  # part of the mechanism's natural force that the size of forces on a body has at least, massless or not
 _DENSE = 100.0  # factor for samples on dense output of DOP853, whose long steps miss up to 1.4e-9 of a state inside
 _RANK = 1e-12  # relative singular value below which unknown forces are one
-_IN_PLANE = 1e-12  # component of a direction that is round-off
+_ACROSS = 1e-2  # part of an axis across a normal below which other axes tell that direction with more digits
 
 
 def on_the_motion(
@@ -65,14 +65,15 @@ def _newton_and_euler(
         place = scene.placed(connection, pieces).origin_b
         force, moment = published.reactions[..., number, :3], published.reactions[..., number, 3:]
         loads.between(connection.b, connection.a, place, np.nan_to_num(force), np.nan_to_num(moment))
-        unknown.take(connection.b, connection.a, place, np.isnan(force), np.isnan(moment))
+        unknown.take(connection.b, connection.a, place, np.isnan(force), np.isnan(moment), np.zeros(3))
     for k, contact in enumerate(scene.contacts):
         place, force = pieces.place[..., k, :], pieces.force[..., k, :]
         moment = pieces.rolling[..., k, :] + pieces.spinning[..., k, :]
         moment = moment + (np.nan if pieces.modes.contacts[k] == SPREAD else 0.0)
-        loads.between(contact.a, contact.b, place, np.nan_to_num(force), np.nan_to_num(moment))
+        told, way = _with_normal_force(force, pieces.normal[..., k, :], published.values["normal_forces"][:, None, k])
+        loads.between(contact.a, contact.b, place, told, np.nan_to_num(moment))
         pressed = ~(norm(force) <= 0)[..., None]
-        unknown.take(contact.a, contact.b, place, np.isnan(force), np.isnan(moment) & pressed)
+        unknown.take(contact.a, contact.b, place, np.isnan(force), np.isnan(moment) & pressed, way)
     mass, trace = scene.mass[:bodies], np.trace(scene.inertia, axis1=-2, axis2=-1)[:bodies]
     left = np.concatenate(
         [mass[:, None] * acceleration - loads.force[..., :bodies, :], spin_rate - loads.moment[..., :bodies, :]], -1
@@ -97,6 +98,15 @@ def _newton_and_euler(
         residuals.note("euler", body.name, norm(left[..., k, 3:]), turning[..., k], pieces.time, next(rooms))
 
 
+def _with_normal_force(force: Array, normal: Array, N: Array) -> tuple[Array, Array]:
+    """Force with zero for what is unknown but for what N tells, and the part of the normal among it, of length 1."""
+    way = np.where(np.isnan(force) & ~np.isnan(N)[..., None], normal, 0.0)
+    size, known = norm(way)[..., None], np.nan_to_num(force)
+    way = np.where(size > IN_PLANE, way / np.maximum(size, IN_PLANE), 0.0)
+    rest = np.nan_to_num(N - dot(normal, known))[..., None]
+    return known + way * rest / np.maximum(size, IN_PLANE), way
+
+
 def _momenta(scene: LawScene, moving: BodyPoses) -> tuple[Array, Array]:
     """Velocities of centres of mass, and angular momenta about them."""
     inertia = moving.R @ scene.inertia @ moving.R.swapaxes(-1, -2)
@@ -110,11 +120,19 @@ class _Unknown:
         self._bodies, self._shape = len(scene.mechanism.bodies), pieces.time.shape
         self._centres, self._columns = scene.centres(pieces)[0], list[Array]()
 
-    def take(self, b: int, a: int, place: Array, force: NDArray[np.bool_], moment: NDArray[np.bool_]) -> None:
-        """Takes unknown components, (samples, 1, 3), of a force at a place on body b and a moment; opposite on a."""
+    def take(
+        self, b: int, a: int, place: Array, force: NDArray[np.bool_], moment: NDArray[np.bool_], known: Array
+    ) -> None:
+        """Takes unknown components, (samples, 1, 3), of a force at a place on body b and a moment; opposite on a.
+
+        ``known``: direction in which their part of the force is known, or zero.
+        """
         for mask, turns in ((force, False), (moment, True)):
             for axis in np.flatnonzero(mask.any((0, 1))):
                 unit = np.where(mask, np.eye(3)[axis], 0.0)
+                if not turns:
+                    unit = unit - known * known[..., [axis]]
+                    unit = np.where(norm(unit)[..., None] > _ACROSS, unit, 0.0)
                 column = np.zeros((*self._shape, self._bodies, 6))
                 for body, sign in ((b, 1.0), (a, -1.0)):
                     if body < self._bodies:
@@ -157,8 +175,7 @@ def _along(
         natural = scene.force * (scene.length if axis.turns else 1.0)
         wrench = published.reactions[..., axis.joint, :]
         part = wrench[..., 3:] if axis.turns else wrench[..., :3]
-        direction = axis.direction
-        said = dot(np.where(np.abs(direction) < _IN_PLANE, 0.0, part), direction)
+        said = along(part, axis.direction)
         expected, size = axis.force, axis.size + _ARM * natural + np.nan_to_num(norm(part))
         size = size + np.nan_to_num(norm(pieces.force)).sum(-1) * (scene.length if axis.turns else 1.0)
         digits = axis.digits

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from proofroll.truth.check.laws.contacts import gap_of, slide_of
-from proofroll.truth.check.laws.integrals import cross, dot, norm, of_angles, of_quaternion, turned
+from proofroll.truth.check.laws.integrals import along, cross, dot, norm, of_angles, of_quaternion, turned
 from proofroll.truth.check.laws.joints import coordinate_of
 from proofroll.truth.check.laws.loads import bushing_load, rotation_vector, spring_ends, spring_pull
 from proofroll.truth.check.laws.record import Array, BodyPoses, PublishedValues
@@ -165,7 +165,7 @@ def _names(scene: LawScene, published: PublishedValues, residuals: LawResiduals)
             ("contact_forces", values["contact_forces"], forces),
             ("gaps", values["gaps"], np.stack([values[f"gap.{name}"] for name in names], -1)),
             ("slips", values["slips"], np.stack([values[f"slip.{name}"] for name in names], -1)),
-            ("normal_forces", values["normal_forces"], dot(forces, pieces.normal[:, 0])),
+            ("normal_forces", values["normal_forces"], along(forces, pieces.normal[:, 0])),
         ]
     shared = dict[str, list[int]]()
     for k, contact in enumerate(scene.contacts):

@@ -188,11 +188,11 @@ def residuals(
 ) -> dict[str, FloatArray]:
     """Residuals of the contact laws and ``unpressed``, by name, shape (time, contacts).
 
-    ``penetration`` always has values; the others are NaN where no component of the force is known.
+    ``penetration`` always has values; the others are NaN where neither N nor a component of the force is known.
 
     Args:
         followed: the contacts along the motion.
-        pressed: forces on their first bodies [N], shape (time, contacts, 3); NaN where not determinate.
+        pressed: forces on their first bodies, as of :func:`normal_forces`.
         friction: their coefficients while they slip, shape (contacts,).
         weight: of the mechanism [N].
         speed: natural speed, which scales slip against weight in the natural map [m/s].
@@ -201,8 +201,9 @@ def residuals(
     kinetic = np.broadcast_to(friction, followed.slip.shape)
     friction = np.where(followed.slip > SLIDES * speed, friction, friction if static is None else static)
     n, u_n = followed.normal, np.sum(followed.normal * followed.slide, axis=-1)
-    complete, has_force = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
-    N = normal_forces(followed, pressed)
+    N, pressed = normal_forces(followed, pressed), pressed[..., :3]
+    complete = np.all(np.isfinite(pressed), axis=-1)
+    has_force = np.isfinite(N) | np.any(np.isfinite(pressed), axis=-1)
     u = followed.slide - n * u_n[..., None]
     T = np.where(complete[..., None], pressed - N[..., None] * n, 0.0)
     presses = np.asarray(PRESSES * weight < N)
@@ -240,9 +241,14 @@ def residuals(
 
 
 def normal_forces(followed: Followed, pressed: FloatArray) -> FloatArray:
-    """Normal force of each contact [N], shape (time, contacts); known from the normal component alone, others NaN."""
+    """Normal force of each contact [N], shape (time, contacts); NaN where it is not known.
+
+    ``pressed``: forces on the first bodies [N], (time, contacts, 3), NaN where not determinate; behind them perhaps
+    moments against turning [N m] and normal forces, (time, contacts, 7).
+    """
     in_use = np.abs(followed.normal) > _AXIS
-    return np.asarray(np.sum(np.where(in_use, pressed, 0.0) * followed.normal, axis=-1))
+    N = np.sum(np.where(in_use, pressed[..., :3], 0.0) * followed.normal, axis=-1)
+    return np.asarray(np.where(np.isnan(N), pressed[..., 6], N) if pressed.shape[-1] > 3 else N)
 
 
 def _onto_cone(N: FloatArray, T: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,8 +8,7 @@ from proofroll.elements.mechanism import Body, Force, Joint, Mechanism
 from proofroll.elements.mechanism.scene.parts import Spring
 from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.elements.mechanism.scene.spring_law import SpringLaw
-from proofroll.truth.signal_poles import first_pole
-from proofroll.truth.truth_of_mechanism import truth_of
+from proofroll.truth.truth_of_mechanism import first_pole, truth_of
 
 
 def pushed(text: str) -> Mechanism:
