@@ -83,6 +83,8 @@ def report(
 
     For the first screen each engine is searched in each scene as by ``recommend``; 30 s of processor time at most each.
     """
+    options.begin_workers()
+
     from dataclasses import replace
 
     from proofroll.core.errors import InputError
@@ -95,8 +97,7 @@ def report(
     from proofroll.running.store import alone_in
     from proofroll.studies.comparison.by_name import comparison_named
 
-    begin = _processor_seconds()
-    earlier = _earlier(against, comment)
+    begin, earlier = _processor_seconds(), _earlier(against, comment)
     workers, assigned = Workers(), options.assignments(settings)
     if budget and scheduler:
         raise InputError("--budget", budget, "runs on a cluster have none; drop --scheduler")

@@ -49,14 +49,6 @@ class Workers:
             self._made.add(worker)
         return worker
 
-    def fork(self, engine: str) -> None:
-        """Forks a worker for an engine, unless it is of another interpreter or other threads run here.
-
-        :func:`.forked.may_be_forked` has to hold.
-        """
-        if "@" not in engine and threading.active_count() == 1:
-            self.keep(engine, Worker(self._memory, forked=True))
-
     def keep(self, engine: str, worker: Worker) -> None:
         """Takes back a worker that has answered all its requests."""
         with self._lock:

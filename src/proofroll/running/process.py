@@ -18,7 +18,7 @@ from typing import Any, Self
 from proofroll.core.errors import InputError, Missing, ProofrollError, Unwritable
 from proofroll.core.pace import AT, PACE
 from proofroll.running.case import Status
-from proofroll.running.forked import THREADS, Forked
+from proofroll.running.forked import THREADS, Forked, forked
 from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
 
 # A worker draws nothing; MuJoCo would look for a library of windows, which takes a tenth of a second.
@@ -95,20 +95,18 @@ def environment_of_another() -> dict[str, str]:
 
 
 class Worker:
-    """A worker process. After its end a new one must be made.
+    """A worker process, forked if there is a :func:`.forked.begin_template`. After its end a new one must be made.
 
     Args:
         memory: limit for it and its descendants [GB]; by default :func:`memory.memory_limit`.
         python: another interpreter in which it runs; by default this one.
-        forked: True to fork it with the modules that this process has imported, see
-            :func:`.forked.may_be_forked`.
 
     Attributes:
         waited: wall time for the last answer; for the first one from the start of the process [s].
         used: processor time of the process until its last answer [s].
     """
 
-    def __init__(self, memory: float | None = None, python: Path | None = None, *, forked: bool = False) -> None:
+    def __init__(self, memory: float | None = None, python: Path | None = None) -> None:
         self._began, self.waited = time.perf_counter(), 0.0
         self._memory = memory or memory_limit()
         self._ending = threading.Lock()
@@ -121,22 +119,21 @@ class Worker:
         try:
             self._process: subprocess.Popen[str] | Forked
             environment = _NO_WINDOWS | (environment_of_another() if python else safe_environment()) | THREADS
-            if forked:
-                self._process = Forked(writer, log, life, environment)
-            else:
-                self._process = subprocess.Popen(
-                    [
-                        python or sys.executable,
-                        *("-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)),
-                    ],
-                    stdin=subprocess.PIPE,
-                    stdout=log,
-                    stderr=log,
-                    pass_fds=(writer, life),
-                    env=environment,
-                    text=True,
-                    start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
-                )
+            self._process = (None if python else forked(writer, log, life, environment)) or subprocess.Popen(
+                [
+                    python or sys.executable,
+                    *("-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)),
+                ],
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                pass_fds=(writer, life),
+                env=environment,
+                text=True,
+                start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
+            )
+            if isinstance(self._process, Forked):
+                self._descriptors.append(self._process.end)
         except OSError as error:
             for descriptor in self._descriptors:
                 os.close(descriptor)
@@ -258,6 +255,8 @@ class Worker:
         """True if the process has ended. It is not reaped, so that no other process can get its number."""
         if self._process.returncode is not None:
             return True
+        if isinstance(self._process, Forked):
+            return self._process.has_ended()
         if not hasattr(os, "waitid"):  # macOS before Python 3.13: there what the process started outlives it
             return self._process.poll() is not None
         try:
