@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 from proofroll.core.pace import PACE
 from proofroll.running.process_end import INTERRUPTS
@@ -62,7 +62,7 @@ def begin_template(*modules: str) -> None:
     sys.stdout.flush()
     sys.stderr.flush()
     if os.fork() == 0:
-        _serve_forks(theirs)
+        _serve(theirs)
     theirs.close()
     _line = ours
 
@@ -70,34 +70,17 @@ def begin_template(*modules: str) -> None:
 class Forked:
     """Forked worker, with the part of :class:`subprocess.Popen` that its parent uses.
 
-    Args:
-        answers: descriptor of the pipe for its answers.
-        log: descriptor for what it prints.
-        life: descriptor of the pipe that this process holds open while it lives.
-        environment: its variables.
-
     Attributes:
+        pid: its number.
         end: descriptor that can be read once the process has ended, to be closed by its parent.
-
-    Raises:
-        OSError: there is no template, or it does not answer.
+        returncode: exit code; None: nothing has waited for its end, so that no other process has its number.
     """
 
-    def __init__(self, answers: int, log: int, life: int, environment: Mapping[str, str]) -> None:
-        self.returncode: int | None = None
-        requests, writer = os.pipe()
-        try:
-            self.pid = _told({"environment": environment}, requests, answers, log, life)
-            self.end = os.pidfd_open(self.pid)
-        except OSError:
-            os.close(writer)
-            raise
-        finally:
-            os.close(requests)
-        self.stdin = os.fdopen(writer, "w", encoding="utf-8")
+    def __init__(self, pid: int) -> None:
+        self.pid, self.end, self.returncode = pid, os.pidfd_open(pid), cast("int | None", None)
 
     def has_ended(self) -> bool:
-        """True if the process has ended; nothing has waited for it, so that no other process has its number."""
+        """True if the process has ended."""
         return bool(select.select([self.end], [], [], 0)[0])
 
     def wait(self) -> int:
@@ -106,15 +89,20 @@ class Forked:
             select.select([self.end], [], [])
             try:
                 self.returncode = _told({"ended": self.pid})
-            except OSError:  # a template that was killed, and its workers with it
+            except OSError:  # the template was killed, and its workers with it
                 self.returncode = -signal.SIGKILL
         return self.returncode
 
 
-def forked(answers: int, log: int, life: int, environment: Mapping[str, str]) -> Forked | None:
-    """Forked worker, see :class:`Forked`; None if there is no template, or it does not answer."""
+def forked(environment: Mapping[str, str], *descriptors: int) -> Forked | None:
+    """Forked worker, or None if there is no template, or it does not answer.
+
+    Args:
+        environment: its variables.
+        descriptors: of the pipes for its requests, its answers, what it prints, and the life of this process.
+    """
     try:
-        return Forked(answers, log, life, environment)
+        return Forked(_told({"environment": environment}, *descriptors))
     except OSError:
         return None
 
@@ -129,60 +117,31 @@ def _told(message: Mapping[str, Any], *descriptors: int) -> int:
             socket.send_fds(_line, [json.dumps(message).encode()], [theirs, *descriptors])
         finally:
             os.close(theirs)
-        text = read.read()
-    if not text:
-        raise BrokenPipeError
-    return int(text)
+        if text := read.read():
+            return int(text)
+    raise BrokenPipeError
 
 
-def _serve_forks(line: socket.socket) -> NoReturn:
-    """Turns a process that was just forked into a template, and ends it with the process that it was forked from."""
+def _serve(line: socket.socket) -> NoReturn:
+    """Turns a process that was just forked into a template, and each that it forks into a worker, as if started."""
+    code = 1
     try:
-        os.setsid()
+        nothing, template = os.open(os.devnull, os.O_RDWR), os.getpid()
+        _settle((nothing, nothing, nothing), line.fileno())
         for number in INTERRUPTS:
             signal.signal(number, signal.SIG_DFL)
-        nothing, template = os.open(os.devnull, os.O_RDWR), os.getpid()
-        for standard in range(3):
-            os.dup2(nothing, standard)
-        _close_all_but(line.fileno())
         if not sys.flags.safe_path:
             del sys.path[0]  # the folder of the command, or the working folder
         atexit._clear()
         gc.freeze()  # a collection would copy the pages that all processes share
-        while True:
-            text, (answer, *descriptors), *_ = socket.recv_fds(line, _LONGEST, 5)
-            message = json.loads(text)
-            if "ended" in message:
-                code = os.waitstatus_to_exitcode(os.waitpid(message["ended"], 0)[1])
-            elif not (code := os.fork()):
-                os.environ.clear()
-                os.environ.update(message["environment"])
-                _serve(template, *descriptors)
-            os.write(answer, b"%d" % code)
-            for descriptor in (answer, *descriptors):
-                os.close(descriptor)
-    finally:
-        os._exit(0)
-
-
-def _close_all_but(*kept: int) -> None:
-    """Closes all descriptors of this process but these and the standard ones."""
-    for descriptor, following in pairwise([2, *sorted(kept), os.sysconf("SC_OPEN_MAX")]):
-        os.closerange(descriptor + 1, following)
-
-
-def _serve(parent: int, requests: int, answers: int, log: int, life: int) -> NoReturn:
-    """Turns a process that was just forked into a worker, as if it had been started, and ends it after its work."""
-    code = 1
-    try:
-        os.setsid()
-        for descriptor, own in zip((requests, log, log), range(3), strict=True):
-            os.dup2(descriptor, own)
-        _close_all_but(answers, life)
+        environment, (requests, answers, log, life) = _asked_of_template(line)
+        _settle((requests, log, log), answers, life)
+        os.environ.clear()
+        os.environ.update(environment)
         PACE.aloud = True
         from proofroll.running.worker import main
 
-        main(answers, parent, life)
+        main(answers, template, life)
         code = 0
     except BaseException:
         traceback.print_exc()
@@ -190,3 +149,29 @@ def _serve(parent: int, requests: int, answers: int, log: int, life: int) -> NoR
         atexit._run_exitfuncs()
         sys.stdout.flush()
         os._exit(code)
+
+
+def _settle(standard: tuple[int, int, int], *kept: int) -> None:
+    """Leaves to this process a session of its own, these standard descriptors, and those that are kept."""
+    os.setsid()
+    for descriptor, own in zip(standard, range(3), strict=True):
+        os.dup2(descriptor, own)
+    for number, following in pairwise([2, *sorted(kept), os.sysconf("SC_OPEN_MAX")]):
+        os.closerange(number + 1, following)
+
+
+def _asked_of_template(line: socket.socket) -> tuple[dict[str, str], list[int]]:
+    """Environment and descriptors of a worker, in the process that was forked for it.
+
+    The template answers messages until the process that sends them has ended, and then raises ValueError.
+    """
+    while True:
+        text, (answer, *descriptors), *_ = socket.recv_fds(line, _LONGEST, 5)
+        message = json.loads(text)
+        if "ended" in message:
+            told = os.waitstatus_to_exitcode(os.waitpid(message["ended"], 0)[1])
+        elif not (told := os.fork()):
+            return message["environment"], descriptors
+        os.write(answer, b"%d" % told)
+        for descriptor in (answer, *descriptors):
+            os.close(descriptor)

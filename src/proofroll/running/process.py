@@ -112,36 +112,32 @@ class Worker:
         self._ending = threading.Lock()
         self._answers, writer = os.pipe()
         self._words, log = os.pipe()
+        requests, asked = os.pipe()
+        self._requests = os.fdopen(asked, "w", encoding="utf-8")
         life, self._life = os.pipe()  # never written to: it closes when this process ends, even if killed
         os.set_blocking(self._words, False)
         self._open = [self._answers, self._words]
         self._descriptors = [*self._open, self._life]
+        environment = _NO_WINDOWS | (environment_of_another() if python else safe_environment()) | THREADS
+        self._process: subprocess.Popen[bytes] | Forked
         try:
-            self._process: subprocess.Popen[str] | Forked
-            environment = _NO_WINDOWS | (environment_of_another() if python else safe_environment()) | THREADS
-            self._process = (None if python else forked(writer, log, life, environment)) or subprocess.Popen(
-                [
-                    python or sys.executable,
-                    *("-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)),
-                ],
-                stdin=subprocess.PIPE,
+            self._process = (None if python else forked(environment, requests, writer, log, life)) or subprocess.Popen(
+                [python or sys.executable, "-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)],
+                stdin=requests,
                 stdout=log,
                 stderr=log,
                 pass_fds=(writer, life),
                 env=environment,
-                text=True,
                 start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
             )
-            if isinstance(self._process, Forked):
-                self._descriptors.append(self._process.end)
         except OSError as error:
-            for descriptor in self._descriptors:
-                os.close(descriptor)
+            self._close_pipes()
             raise ProofrollError(f"a worker process cannot be started: {error.strerror or error}") from None
         finally:
-            os.close(writer)
-            os.close(log)
-            os.close(life)
+            for descriptor in (requests, writer, log, life):
+                os.close(descriptor)
+        if isinstance(self._process, Forked):
+            self._descriptors.append(self._process.end)
         _living.add(self)
         self.used = 0.0
         self._pending = b""
@@ -161,9 +157,8 @@ class Worker:
         self._forget_words()
         self._asked += 1
         try:
-            assert self._process.stdin is not None  # it was opened with a pipe
-            self._process.stdin.write(json.dumps({**request, "number": self._asked}) + "\n")
-            self._process.stdin.flush()
+            self._requests.write(json.dumps({**request, "number": self._asked}) + "\n")
+            self._requests.flush()
         except (OSError, ValueError):  # the pipe is broken or closed
             raise WorkerDied(Status.CRASHED, self._last_words()) from None
         asked = time.perf_counter()
@@ -308,9 +303,11 @@ class Worker:
     def close(self) -> None:
         """Kills the process and closes its pipes."""
         self.kill()
-        if self._process.stdin is not None:
-            with contextlib.suppress(BrokenPipeError):
-                self._process.stdin.close()
+        self._close_pipes()
+
+    def _close_pipes(self) -> None:
+        with contextlib.suppress(BrokenPipeError):
+            self._requests.close()
         while self._descriptors:
             os.close(self._descriptors.pop())
 
