@@ -17,16 +17,14 @@ from typing import Annotated, Any
 import typer
 
 import proofroll
-from proofroll.cli.cite import cite
 from proofroll.cli.command_groups import NOW, GroupedCommands
 from proofroll.cli.comparing import compare
 from proofroll.cli.diff import diff
 from proofroll.cli.engines import engines
 from proofroll.cli.export import export
-from proofroll.cli.findings import findings
 from proofroll.cli.judge import judge
 from proofroll.cli.ladder import ladder
-from proofroll.cli.lists import scenes
+from proofroll.cli.lists import cite, findings, scenes
 from proofroll.cli.new import new
 from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.recommend import recommend

@@ -26,16 +26,6 @@ if TYPE_CHECKING:
     from proofroll.running.idle_workers import Workers
     from proofroll.running.runner import Runner
 
-# What runs, truths and certificates import, but for engines and kinds of elements.
-_OF_WORKERS = (
-    "proofroll.core.first_steps",
-    "proofroll.core.multi_element",
-    "proofroll.core.truth",
-    "proofroll.running.recording",
-    "proofroll.running.worker",
-    "scipy.linalg",
-    "scipy.spatial.transform",
-)
 _SAID_EVERY = 10.0  # interval between lines of progress if no bar can be shown [s]
 OK, CONTRADICTED, USAGE, ENGINE, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -190,16 +180,16 @@ def doubt_numbers(scene: str, settings: list[str] | None) -> None:
 
 
 def begin_workers(*, judges: bool = True) -> None:
-    """Imports what all workers need, and forks them from here on, as by :func:`.forked.begin_template`.
+    """Imports what most workers need but engines, and forks them from here on, see :func:`.forked.begin_template`.
 
     ``judges``: True if this process judges runs, which needs more.
     """
     from proofroll.core.entry_points import announced
-    from proofroll.core.source_code import OWN
     from proofroll.running.forked import begin_template
 
-    kinds = [point.module for point in announced("proofroll.elements") if point.module.startswith(f"{OWN.name}.")]
-    begin_template(*_OF_WORKERS, *kinds, *(["scipy.optimize"] if judges else []))
+    kinds = [point.module for point in announced("proofroll.elements") if point.module.startswith("proofroll.")]
+    own = "proofroll.core.first_steps", "proofroll.running.recording", "proofroll.running.worker"
+    begin_template(*own, *kinds, "scipy.optimize" if judges else "scipy.spatial.transform")
 
 
 def new_runner(

@@ -131,7 +131,6 @@ class Runner:
         self.hosts: Counter[str] = Counter()
         """Machine -> number of results that it made, stored ones included; an empty name is this machine."""
         self._run_here: set[str] = set()
-        self._busy: set[Worker] = set()
         self._stopping = threading.Event()
 
     def run(
@@ -244,8 +243,7 @@ class Runner:
     def _stop(self) -> None:
         """Ends all running cases, on this machine and on the cluster."""
         self._stopping.set()
-        for worker in list(self._busy):
-            worker.kill()
+        self.workers.kill()
         if self.cluster is not None:
             self.cluster.stop()
 
@@ -268,7 +266,6 @@ class Runner:
             while (taken := self._next(waiting, engine, arrived)) is not None:
                 case, limit = taken
                 if worker is not None and engine is not None and case.engine.name != engine:
-                    self._busy.discard(worker)
                     self.workers.keep(engine, worker)
                     worker = None
                 engine = case.engine.name
@@ -281,11 +278,10 @@ class Runner:
                             waiting.budget.end(case.key)
                         arrived.put((case, result_without_answer(case, gone)))
                         continue
-                    self._busy.add(worker)
-                    if self._stopping.is_set():  # _stop may have run before this worker was in _busy
+                    if self._stopping.is_set():  # _stop may have run before this worker was in the pool
                         break
                 if not self._arrive(arrived, case, partial(_counted, waiting.budget, worker, case, limit)):
-                    self._drop(worker)
+                    worker.close()
                     worker = None
         except Exception as error:
             arrived.put(error)
@@ -293,9 +289,8 @@ class Runner:
         if worker is None or engine is None:
             return
         if self._stopping.is_set():
-            self._drop(worker)
+            worker.close()
         else:
-            self._busy.discard(worker)
             self.workers.keep(engine, worker)
 
     def _lacks_speed(self, case: Case, stored: Result) -> bool:
@@ -333,10 +328,6 @@ class Runner:
                 shown = shown.replace("another path", "another folder with --out")
                 raise Unwritable(shown, error.number, error.reason) from None
             return self.store.put(case, result, written)
-
-    def _drop(self, worker: Worker) -> None:
-        self._busy.discard(worker)
-        worker.close()
 
 
 def _ask(worker: Worker, case: Case, limit: float, out: Path) -> Result:

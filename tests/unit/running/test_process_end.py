@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="th
 POOL = """
 import sys, time
 from pathlib import Path
-from proofroll.running.in_processes import process_pool
+from proofroll.running.process_end import process_pool
 
 if __name__ == "__main__":
     with process_pool(2) as pool:
