@@ -86,7 +86,6 @@ def compare(
     your own model, to 1e-4 of the path by default, and the line to change is named.
     """
     options.begin_workers()
-
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.report.terminal.verdicts import verdict_parts

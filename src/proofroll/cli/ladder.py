@@ -30,7 +30,6 @@ def ladder(
 ) -> None:
     """Compare one quantity across models of increasing detail. Each optional term is then off and on."""
     options.begin_workers()
-
     from proofroll.report.ladder.ladder import ladder_content
     from proofroll.report.ladder.tables import ladder_parts
     from proofroll.studies.ladder.ladder import Ladder

@@ -59,7 +59,6 @@ def recommend(
     what that leaves open is named. Exit 1 if nothing holds the tolerance, 3 if no engine could be tried.
     """
     options.begin_workers()
-
     from proofroll.files.json_data import plain
     from proofroll.report.answer.sentences import answer_lines, scope_sentence, taken_sentence
     from proofroll.report.terminal.screen import WIDTH

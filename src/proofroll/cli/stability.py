@@ -28,7 +28,6 @@ def stability(
 ) -> None:
     """Map up to which step each engine is stable, and right. The map goes along axes of extremes."""
     options.begin_workers()
-
     from proofroll.report.page.html import templates
     from proofroll.report.pages import rendered
     from proofroll.report.stability.part import StabilityPart

@@ -49,7 +49,6 @@ def watch(
     is one line here, and the page stays.
     """
     options.begin_workers(judges=False)
-
     from proofroll.core.time_grid import time_grid
     from proofroll.running.idle_workers import Workers
 

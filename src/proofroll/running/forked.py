@@ -18,8 +18,7 @@ import traceback
 from collections.abc import Mapping
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
-from typing import Any, NoReturn, cast
+from typing import Any, NoReturn
 
 from proofroll.core.pace import PACE
 from proofroll.running.process_end import INTERRUPTS
@@ -40,7 +39,7 @@ def may_be_forked() -> bool:
 
     False on other systems than Linux, beside other threads, and where numpy was imported before.
     """
-    if sys.platform != "linux" or threading.active_count() > 1 or "numpy" in sys.modules:
+    if not hasattr(os, "pidfd_open") or threading.active_count() > 1 or "numpy" in sys.modules:
         return False
     os.environ.update(THREADS)
     return True
@@ -56,7 +55,7 @@ def begin_template(*modules: str) -> None:
         return
     for name in modules:
         importlib.import_module(name)
-    if len(list(Path("/proc/self/task").iterdir())) > 1:
+    if len([*os.scandir("/proc/self/task")]) > 1:
         return
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)  # which keeps messages apart
     sys.stdout.flush()
@@ -77,7 +76,8 @@ class Forked:
     """
 
     def __init__(self, pid: int) -> None:
-        self.pid, self.end, self.returncode = pid, os.pidfd_open(pid), cast("int | None", None)
+        self.pid, self.end = pid, os.pidfd_open(pid)
+        self.returncode: int | None = None
 
     def has_ended(self) -> bool:
         """True if the process has ended."""
@@ -89,7 +89,7 @@ class Forked:
             select.select([self.end], [], [])
             try:
                 self.returncode = _told({"ended": self.pid})
-            except OSError:  # the template was killed, and its workers with it
+            except (OSError, ValueError):  # the template was killed, and its workers with it
                 self.returncode = -signal.SIGKILL
         return self.returncode
 
@@ -103,12 +103,12 @@ def forked(environment: Mapping[str, str], *descriptors: int) -> Forked | None:
     """
     try:
         return Forked(_told({"environment": environment}, *descriptors))
-    except OSError:
+    except (OSError, ValueError):
         return None
 
 
 def _told(message: Mapping[str, Any], *descriptors: int) -> int:
-    """Number that the template answers. Raises OSError if there is none, or if it does not answer."""
+    """Number that the template answers. Raises OSError if there is none, ValueError if it does not answer."""
     if _line is None:
         raise BrokenPipeError
     answer, theirs = os.pipe()  # of this message alone, so that threads need not wait for one another
@@ -117,9 +117,7 @@ def _told(message: Mapping[str, Any], *descriptors: int) -> int:
             socket.send_fds(_line, [json.dumps(message).encode()], [theirs, *descriptors])
         finally:
             os.close(theirs)
-        if text := read.read():
-            return int(text)
-    raise BrokenPipeError
+        return int(read.read())
 
 
 def _serve(line: socket.socket) -> NoReturn:

@@ -84,8 +84,7 @@ class Workers:
     def speed(self, case: Case, seconds: float | None = None) -> float | None:
         """Wall time per simulated second of a case, from clean runs that only advance; None: they failed.
 
-        The runs take ``seconds`` of wall time, by default :data:`SECONDS`. A caller of one thread gets the same worker
-        again for each engine.
+        The runs take ``seconds`` of wall time, by default :data:`SECONDS`, in the last idle worker of the engine.
         """
         request = {"do": "time", "case": asdict(case), "seconds": seconds or SECONDS}
         try:

@@ -139,10 +139,8 @@ class Worker:
         if isinstance(self._process, Forked):
             self._descriptors.append(self._process.end)
         _living.add(self)
-        self.used = 0.0
-        self._pending = b""
-        self._said = b""
-        self._asked = 0
+        self.used, self._asked = 0.0, 0
+        self._pending = self._said = b""
 
     def ask(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
         """Answer to one request.
