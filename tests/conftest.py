@@ -31,7 +31,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from proofroll import cli
 from proofroll.files.scene_file import load_scene
-from proofroll.running import idle_workers, stopwatch
+from proofroll.running import idle_workers
 from proofroll.running.case import Case, EngineFacts
 
 PLUGINS = Path(__file__).parent / "plugins"
@@ -55,7 +55,7 @@ settings.register_profile(
 settings.load_profile("repeatable")
 
 # Each measurement of speed is a real one, but short [s]: no test asks how exact it is.
-stopwatch.SECONDS = 0.002
+idle_workers.SECONDS = 0.002
 
 # Each core has a pytest process (``make test``): more worker processes at once would be more to start, and no faster.
 os.cpu_count = lambda: 1

@@ -20,9 +20,9 @@ from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.truth.onset import first_slip as true_first_slip
+from proofroll.running.engine_questions import lent_workers
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
-from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.store import Store
 from proofroll.running.timing import Interval, Timing, machine, ratio, time_in_rounds
 from proofroll_benchmarks.compiled import Onsets, Timed, compiled, numeric
@@ -73,11 +73,11 @@ def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         configurations = search(free, until, true_z, ENGINE_BOUND, Runner(Store(Path(folder))), _FINALISTS, progress)
     finalists = {item.name: item for item in configurations}
-    with Stopwatch() as stopwatch:
+    with lent_workers(None) as workers:
 
         def timed(item: Configuration) -> Callable[[], float | None]:
             def task() -> float | None:
-                rate = stopwatch(item.case)
+                rate = workers.speed(item.case)
                 return None if rate is None else rate * slip
 
             return task

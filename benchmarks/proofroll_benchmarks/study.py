@@ -14,10 +14,9 @@ from typing import Any
 from proofroll.core.errors import ProofrollError
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Case, EngineFacts, Result
-from proofroll.running.engine_questions import describe, resolve
+from proofroll.running.engine_questions import describe, lent_workers, resolve
 from proofroll.running.process import Worker
 from proofroll.running.runner import Runner
-from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.store import Store
 
 SCENE, EVERY = "sphere_in_cylinder", 0.02
@@ -49,16 +48,16 @@ def study_cases(engines: Sequence[str], seconds: float = LEAST_SECONDS) -> list[
         if "matched" in presets and needed <= set(said.provides[formulation])
     ]
     cases = []
-    with Stopwatch() as stopwatch:
-        for facts in resolve(wanted):
+    with lent_workers(None) as workers:
+        for facts in resolve(wanted, workers):
             if not isinstance(facts, EngineFacts):
                 raise facts
             for parameters in POINTS:
                 digest = load_scene(SCENE, **parameters).digest
                 short = Case(SCENE, dict(parameters), digest, facts, until=EVERY * 10, every=EVERY, timed=True)
-                rate = stopwatch(short)
+                rate = workers.speed(short)
                 if rate:
-                    # What the stopwatch sees is a short stretch; a little more than asked for makes up for that.
+                    # What is measured is a short stretch; a little more than asked for makes up for that.
                     steps = max(10, math.ceil(1.2 * seconds / rate / EVERY))
                     cases.append(dataclasses.replace(short, until=min(steps * EVERY, _LONGEST)))
     return cases

@@ -49,8 +49,8 @@ _SET_CHILD_SUBREAPER = 36  # <linux/prctl.h>
 class Forked:
     """Forked process, with the part of :class:`subprocess.Popen` that a worker's parent uses."""
 
-    def __init__(self, pid: int, stdin: Any) -> None:
-        self.pid, self.stdin = pid, stdin
+    def __init__(self, pid: int) -> None:
+        self.pid = pid
         self.returncode: int | None = None
         self._lock = threading.Lock()
 
@@ -100,17 +100,15 @@ class Forks:
                 self._began_with = at_start
             if list(map(str, words[:3])) != [sys.executable, "-m", _MODULE] or at_start != self._began_with:
                 return subprocess.Popen(words, env=env, pass_fds=pass_fds, **more)
-            theirs, ours = os.pipe()
             request = {"cwd": os.getcwd(), "env": dict(env), "parent": os.getpid()}
             _adopt(1)
             try:
-                descriptors = [theirs, more["stdout"], *pass_fds]
+                descriptors = [more["stdin"], more["stdout"], *pass_fds]
                 socket.send_fds(self._line, [json.dumps(request).encode()], descriptors)
                 pid = int(self._line.recv(64))
             finally:
                 _adopt(0)
-                os.close(theirs)
-        return Forked(pid, os.fdopen(ours, "w", encoding="utf-8"))
+        return Forked(pid)
 
     def _begin(self, env: Mapping[str, str]) -> None:
         self._line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)  # which keeps requests apart

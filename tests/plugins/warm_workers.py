@@ -72,6 +72,7 @@ class WarmWorkers:
                 _follow(found)
             self._started.environment = None
             worker = found or take(workers, idle or engine)
+            workers._made.add(worker)
             # A thread that a test has left behind starts it after that test, in another environment than it looked for.
             if self._started.environment is not None:
                 self._began.setdefault(worker, (*where, _environment(self._started.environment)))

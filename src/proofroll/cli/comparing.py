@@ -85,6 +85,7 @@ def compare(
     is good enough over the scene's own duration, by how much, and which one would do. With --like that is the step of
     your own model, to 1e-4 of the path by default, and the line to change is named.
     """
+    options.begin_workers()
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.screen import WIDTH
     from proofroll.report.terminal.verdicts import verdict_parts

@@ -179,6 +179,19 @@ def doubt_numbers(scene: str, settings: list[str] | None) -> None:
             complain(f"warning: {line}")
 
 
+def begin_workers(*, judges: bool = True) -> None:
+    """Imports what most workers need but engines, and forks them from here on, see :func:`.forked.begin_template`.
+
+    ``judges``: True if this process judges runs, which needs more.
+    """
+    from proofroll.core.entry_points import announced
+    from proofroll.running.forked import begin_template
+
+    kinds = [point.module for point in announced("proofroll.elements") if point.module.startswith("proofroll.")]
+    own = "proofroll.core.first_steps", "proofroll.running.recording", "proofroll.running.worker"
+    begin_template(*own, *kinds, "scipy.optimize" if judges else "scipy.spatial.transform")
+
+
 def new_runner(
     out: Path, fresh: bool, jobs: int | None, scheduler: str | None = None, workers: Workers | None = None
 ) -> Runner:

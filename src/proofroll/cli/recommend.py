@@ -58,6 +58,7 @@ def recommend(
     it holds, too, and a third more does not break down. A run takes about 8 s of processor time at most, an engine 30;
     what that leaves open is named. Exit 1 if nothing holds the tolerance, 3 if no engine could be tried.
     """
+    options.begin_workers()
     from proofroll.files.json_data import plain
     from proofroll.report.answer.sentences import answer_lines, scope_sentence, taken_sentence
     from proofroll.report.terminal.screen import WIDTH

@@ -82,6 +82,7 @@ def report(
 
     For the first screen each engine is searched in each scene as by ``recommend``; 30 s of processor time at most each.
     """
+    options.begin_workers()
     from dataclasses import replace
 
     from proofroll.core.errors import InputError

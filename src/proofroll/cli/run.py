@@ -90,7 +90,7 @@ def run(
 
     chosen, asks = options.assignments(settings), tuple(dict.fromkeys(ask or []))
     loaded = scene_of_run(scene, chosen, asks)  # a mistyped name is answered before more is imported
-    preparing = preparing or _preparing(engine, workers, forked=True)
+    preparing = preparing or _preparing(engine, workers)
     if control is not None or settings:
         options.doubt_numbers(scene, settings)
 
@@ -141,17 +141,14 @@ def run(
         raise typer.Exit(options.ENGINE)
 
 
-def _preparing(engine: str, workers: Workers, *, forked: bool = False) -> Thread:
-    """Thread in which a worker imports the engine, while this process imports the modules that read results.
-
-    ``forked``: True if the worker has the modules that are imported here already, those of scenes.
-    """
+def _preparing(engine: str, workers: Workers) -> Thread:
+    """Thread in which a worker imports the engine, while this process imports the modules that read results."""
     from threading import Thread
 
     from proofroll.running.engine_questions import prepare
+    from proofroll.running.forked import begin_template
 
-    if forked:
-        workers.fork(engine.partition("[")[0])
+    begin_template()
     thread = Thread(target=prepare, args=(engine, workers), daemon=True)
     thread.start()
     return thread

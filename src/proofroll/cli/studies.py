@@ -27,6 +27,7 @@ def stability(
     as_json: options.Json = False,
 ) -> None:
     """Map up to which step each engine is stable, and right. The map goes along axes of extremes."""
+    options.begin_workers()
     from proofroll.report.page.html import templates
     from proofroll.report.pages import rendered
     from proofroll.report.stability.part import StabilityPart
@@ -75,6 +76,7 @@ def ladder(
     as_json: options.Json = False,
 ) -> None:
     """Compare one quantity across models of increasing detail. Each optional term is then off and on."""
+    options.begin_workers()
     from proofroll.report.ladder import ladder_content, ladder_parts
     from proofroll.studies.ladder.ladder import Ladder
 

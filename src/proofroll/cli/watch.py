@@ -48,6 +48,7 @@ def watch(
     The page has the truth and three engines, or those of --engine, and loads itself again. A file that makes no sense
     is one line here, and the page stays.
     """
+    options.begin_workers(judges=False)
     from proofroll.core.time_grid import time_grid
     from proofroll.running.idle_workers import Workers
 

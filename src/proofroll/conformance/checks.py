@@ -25,7 +25,7 @@ from proofroll.conformance.subject import (
 )
 from proofroll.core.engine_abilities import RunsBatches
 from proofroll.core.scene import Scene
-from proofroll.running.in_processes import process_pool
+from proofroll.running.process_end import process_pool
 
 # Outcome of a check in a separate process; these processes, one for each formulation and preset of an engine.
 _PASSED, _SKIPPED, _FAILED = "passed", "skipped", "failed"

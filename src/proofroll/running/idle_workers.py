@@ -5,13 +5,18 @@ import threading
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 
-from proofroll.core.errors import InputError, Missing
+from proofroll.core.errors import InputError, Missing, ProofrollError
+from proofroll.core.limits import STUDY_TIME_LIMIT
+from proofroll.running.case import Case
 from proofroll.running.interpreters import start
 from proofroll.running.process import Worker, WorkerDied
 
 # Most idle workers that are kept, some hundred MB each; beyond it the longest idle one is ended.
 MOST = 8
+# Default length of a measurement [s]: long enough for the clock and the caches, short enough for many rounds.
+SECONDS = 0.05
 
 
 class Workers:
@@ -35,27 +40,19 @@ class Workers:
         self._end = weakref.finalize(self, _close, self._idle)
 
     def take(self, engine: str) -> Worker:
-        """Idle worker that has this engine loaded, or a new one.
+        """Last idle worker that has this engine loaded, or a new one.
 
         Raises:
             InputError, Missing, WorkerDied: the engine's interpreter does not serve, see :func:`interpreters.start`.
         """
         with self._lock:
-            for index, (name, _) in enumerate(self._idle):
-                if name == engine:
+            for index in reversed(range(len(self._idle))):
+                if self._idle[index][0] == engine:
                     return self._idle.pop(index)[1]
         worker = start(engine, self._memory)
         with self._lock:
             self._made.add(worker)
         return worker
-
-    def fork(self, engine: str) -> None:
-        """Forks a worker for an engine, unless it is of another interpreter or other threads run here.
-
-        :func:`.forked.may_be_forked` has to hold.
-        """
-        if "@" not in engine and threading.active_count() == 1:
-            self.keep(engine, Worker(self._memory, forked=True))
 
     def keep(self, engine: str, worker: Worker) -> None:
         """Takes back a worker that has answered all its requests."""
@@ -83,6 +80,19 @@ class Workers:
             worker.close()
             raise
         self.keep(engine, worker)
+
+    def speed(self, case: Case, seconds: float | None = None) -> float | None:
+        """Wall time per simulated second of a case, from clean runs that only advance; None: they failed.
+
+        The runs take ``seconds`` of wall time, by default :data:`SECONDS`, in the last idle worker of the engine.
+        """
+        request = {"do": "time", "case": asdict(case), "seconds": seconds or SECONDS}
+        try:
+            with self.lend(case.engine.name) as worker:
+                rate = worker.ask(request, STUDY_TIME_LIMIT).get("seconds_per_second")
+        except ProofrollError:  # the engine's process died, or its interpreter is gone
+            return None
+        return None if rate is None else float(rate)
 
     def close(self) -> None:
         """Ends the idle workers."""

@@ -18,7 +18,7 @@ from typing import Any, Self
 from proofroll.core.errors import InputError, Missing, ProofrollError, Unwritable
 from proofroll.core.pace import AT, PACE
 from proofroll.running.case import Status
-from proofroll.running.forked import THREADS, Forked
+from proofroll.running.forked import THREADS, Forked, forked
 from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
 
 # A worker draws nothing; MuJoCo would look for a library of windows, which takes a tenth of a second.
@@ -95,61 +95,52 @@ def environment_of_another() -> dict[str, str]:
 
 
 class Worker:
-    """A worker process. After its end a new one must be made.
+    """A worker process, forked if there is a :func:`.forked.begin_template`. After its end a new one must be made.
 
     Args:
         memory: limit for it and its descendants [GB]; by default :func:`memory.memory_limit`.
         python: another interpreter in which it runs; by default this one.
-        forked: True to fork it with the modules that this process has imported, see
-            :func:`.forked.may_be_forked`.
 
     Attributes:
         waited: wall time for the last answer; for the first one from the start of the process [s].
         used: processor time of the process until its last answer [s].
     """
 
-    def __init__(self, memory: float | None = None, python: Path | None = None, *, forked: bool = False) -> None:
+    def __init__(self, memory: float | None = None, python: Path | None = None) -> None:
         self._began, self.waited = time.perf_counter(), 0.0
         self._memory = memory or memory_limit()
         self._ending = threading.Lock()
         self._answers, writer = os.pipe()
         self._words, log = os.pipe()
+        requests, asked = os.pipe()
+        self._requests = os.fdopen(asked, "w", encoding="utf-8")
         life, self._life = os.pipe()  # never written to: it closes when this process ends, even if killed
         os.set_blocking(self._words, False)
         self._open = [self._answers, self._words]
         self._descriptors = [*self._open, self._life]
+        environment = _NO_WINDOWS | (environment_of_another() if python else safe_environment()) | THREADS
+        self._process: subprocess.Popen[bytes] | Forked
         try:
-            self._process: subprocess.Popen[str] | Forked
-            environment = _NO_WINDOWS | (environment_of_another() if python else safe_environment()) | THREADS
-            if forked:
-                self._process = Forked(writer, log, life, environment)
-            else:
-                self._process = subprocess.Popen(
-                    [
-                        python or sys.executable,
-                        *("-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)),
-                    ],
-                    stdin=subprocess.PIPE,
-                    stdout=log,
-                    stderr=log,
-                    pass_fds=(writer, life),
-                    env=environment,
-                    text=True,
-                    start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
-                )
+            self._process = (None if python else forked(environment, requests, writer, log, life)) or subprocess.Popen(
+                [python or sys.executable, "-m", "proofroll.running.worker", str(writer), str(os.getpid()), str(life)],
+                stdin=requests,
+                stdout=log,
+                stderr=log,
+                pass_fds=(writer, life),
+                env=environment,
+                start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
+            )
         except OSError as error:
-            for descriptor in self._descriptors:
-                os.close(descriptor)
+            self._close_pipes()
             raise ProofrollError(f"a worker process cannot be started: {error.strerror or error}") from None
         finally:
-            os.close(writer)
-            os.close(log)
-            os.close(life)
+            for descriptor in (requests, writer, log, life):
+                os.close(descriptor)
+        if isinstance(self._process, Forked):
+            self._descriptors.append(self._process.end)
         _living.add(self)
-        self.used = 0.0
-        self._pending = b""
-        self._said = b""
-        self._asked = 0
+        self.used, self._asked = 0.0, 0
+        self._pending = self._said = b""
 
     def ask(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
         """Answer to one request.
@@ -164,9 +155,8 @@ class Worker:
         self._forget_words()
         self._asked += 1
         try:
-            assert self._process.stdin is not None  # it was opened with a pipe
-            self._process.stdin.write(json.dumps({**request, "number": self._asked}) + "\n")
-            self._process.stdin.flush()
+            self._requests.write(json.dumps({**request, "number": self._asked}) + "\n")
+            self._requests.flush()
         except (OSError, ValueError):  # the pipe is broken or closed
             raise WorkerDied(Status.CRASHED, self._last_words()) from None
         asked = time.perf_counter()
@@ -258,6 +248,8 @@ class Worker:
         """True if the process has ended. It is not reaped, so that no other process can get its number."""
         if self._process.returncode is not None:
             return True
+        if isinstance(self._process, Forked):
+            return self._process.has_ended()
         if not hasattr(os, "waitid"):  # macOS before Python 3.13: there what the process started outlives it
             return self._process.poll() is not None
         try:
@@ -309,9 +301,11 @@ class Worker:
     def close(self) -> None:
         """Kills the process and closes its pipes."""
         self.kill()
-        if self._process.stdin is not None:
-            with contextlib.suppress(BrokenPipeError):
-                self._process.stdin.close()
+        self._close_pipes()
+
+    def _close_pipes(self) -> None:
+        with contextlib.suppress(BrokenPipeError):
+            self._requests.close()
         while self._descriptors:
             os.close(self._descriptors.pop())
 

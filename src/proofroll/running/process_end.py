@@ -1,4 +1,6 @@
-"""Ends a process when the process that started it ends, and lets only the latter handle Ctrl-C."""
+"""Ends processes when the one that started them ends, which alone handles Ctrl-C; a function in several processes."""
+
+from __future__ import annotations
 
 import contextlib
 import fcntl
@@ -6,9 +8,16 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 from proofroll.running.memory import descendants
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
 
 # Signals by which a command is ended from outside: Ctrl-C, a time limit, the end of the terminal.
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -79,3 +88,49 @@ def _watch(parent: int) -> None:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.kill(process, signal.SIGKILL)
     os._exit(1)
+
+
+def in_processes(function: Callable[[Item], Found], items: Sequence[Item], workers: int) -> Iterator[Found]:
+    """Yields a function's result for each item, in order, computed in ``workers`` processes; 1: in this one.
+
+    The function and its results must be picklable. Ctrl-C ends the processes.
+    """
+    from multiprocessing import active_children
+
+    if workers == 1:
+        yield from map(function, items)
+        return
+    with process_pool(workers) as pool:
+        try:
+            # Not pool.map: when interrupted it cancels the rest, and the pool complains when its processes are killed.
+            with interrupt_held():
+                futures = [pool.submit(function, item) for item in items]
+            for future in futures:
+                yield future.result()
+        except BaseException:
+            for process in active_children():
+                process.kill()
+            raise
+
+
+def process_pool(workers: int) -> ProcessPoolExecutor:
+    """Pool of processes that end with this process.
+
+    They are spawned, not forked: a parent that shows progress has threads, and a fork would copy their held locks.
+    """
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_with_pool)
+
+
+def _end_with_pool() -> None:
+    """Makes a process of a pool end with its parent.
+
+    Otherwise it would wait for ever, on a pipe that all of the pool's processes hold open, if the parent is killed.
+    """
+    from multiprocessing import parent_process
+
+    owner = parent_process()
+    if owner is not None and owner.pid is not None:
+        end_with(owner.pid)

@@ -131,7 +131,6 @@ class Runner:
         self.hosts: Counter[str] = Counter()
         """Machine -> number of results that it made, stored ones included; an empty name is this machine."""
         self._run_here: set[str] = set()
-        self._busy: set[Worker] = set()
         self._stopping = threading.Event()
 
     def run(
@@ -244,8 +243,7 @@ class Runner:
     def _stop(self) -> None:
         """Ends all running cases, on this machine and on the cluster."""
         self._stopping.set()
-        for worker in list(self._busy):
-            worker.kill()
+        self.workers.kill()
         if self.cluster is not None:
             self.cluster.stop()
 
@@ -261,62 +259,60 @@ class Runner:
         return None
 
     def _serve(self, waiting: WaitingCases, arrived: _Arrived) -> None:
-        """Serves cases one after another; a new worker is taken for another engine and after each crash."""
-        worker: Worker | None = None
+        """Serves cases one after another, as long as there are any of one engine, whose worker is lent again."""
         engine: str | None = None
         try:
             while (taken := self._next(waiting, engine, arrived)) is not None:
                 case, limit = taken
-                if worker is not None and engine is not None and case.engine.name != engine:
-                    self._busy.discard(worker)
-                    self.workers.keep(engine, worker)
-                    worker = None
                 engine = case.engine.name
-                if worker is None:
-                    try:
-                        worker = self.workers.take(engine)
-                    except (InputError, Missing, WorkerDied) as error:  # the engine's interpreter is gone meanwhile
-                        gone = Missing(str(error)) if isinstance(error, InputError) else error
-                        if waiting.budget:
-                            waiting.budget.end(case.key)
-                        arrived.put((case, result_without_answer(case, gone)))
-                        continue
-                    self._busy.add(worker)
-                    if self._stopping.is_set():  # _stop may have run before this worker was in _busy
-                        break
-                if not self._arrive(arrived, case, partial(_counted, waiting.budget, worker, case, limit)):
-                    self._drop(worker)
-                    worker = None
+                self._arrive(arrived, case, partial(self._in_worker, waiting.budget, case, limit))
         except Exception as error:
             arrived.put(error)
             self._stopping.set()
-        if worker is None or engine is None:
-            return
-        if self._stopping.is_set():
-            self._drop(worker)
-        else:
-            self._busy.discard(worker)
-            self.workers.keep(engine, worker)
+
+    def _in_worker(self, budget: TimeBudget | None, case: Case, limit: float, out: Path) -> Result:
+        """Result of a case whose processor time is charged to a budget; beyond its share the case is left out."""
+        began, used, ended = None, 0.0, False
+        if budget and case.engine.steps:  # a reference by steps keeps what it has
+            case = dataclasses.replace(case, time_limit=min(case.time_limit, limit))
+        try:
+            with self.workers.lend(case.engine.name) as worker:
+                if self._stopping.is_set():  # _stop may have run before this worker was in the pool
+                    raise WorkerDied(Status.CRASHED, "the run was stopped")
+                began = worker.used
+                try:
+                    return _ask(worker, case, limit, out)
+                finally:
+                    used = worker.used - began
+        except InputError as error:
+            if began is None:  # the engine's interpreter is gone meanwhile
+                raise Missing(str(error)) from None
+            raise
+        except WorkerDied as error:
+            ended = True
+            if budget and error.status is Status.TIMEOUT and limit < case.time_limit:
+                raise WorkerDied(Status.LEFT_OUT, budget.sentence) from None
+            raise
+        finally:
+            if budget:
+                budget.end(case.key, used, ended=ended)
 
     def _lacks_speed(self, case: Case, stored: Result) -> bool:
         """True if a stored result has no speed only because a cluster made it; the case is then run on this machine."""
         return bool(case.timed and stored.host and stored.status == Status.DONE and self.cluster is None)
 
-    def _arrive(self, arrived: _Arrived, case: Case, make: Callable[[Path], Result]) -> bool:
-        """Stores and delivers the result of a case, or its failure; False if the process that made it has died."""
+    def _arrive(self, arrived: _Arrived, case: Case, make: Callable[[Path], Result]) -> None:
+        """Stores and delivers the result of a case, or its failure."""
         try:
-            result, lives = self._result(case, make), True
-        except WorkerDied as error:
-            if self._stopping.is_set():
-                return False
-            result, lives = result_without_answer(case, error), False
+            result = self._result(case, make)
         except Unwritable as error:  # a full disk affects every case, so it ends the run
             arrived.put(error)
-            return True
+            return
         except ProofrollError as error:  # affects this case only
-            result, lives = result_without_answer(case, error), True
+            if isinstance(error, WorkerDied) and self._stopping.is_set():
+                return
+            result = result_without_answer(case, error)
         arrived.put((case, result))
-        return lives
 
     def _result(self, case: Case, make: Callable[[Path], Result]) -> Result:
         """Stored result of a case; ``make`` writes its trajectory to a file and returns the result."""
@@ -333,10 +329,6 @@ class Runner:
                 shown = shown.replace("another path", "another folder with --out")
                 raise Unwritable(shown, error.number, error.reason) from None
             return self.store.put(case, result, written)
-
-    def _drop(self, worker: Worker) -> None:
-        self._busy.discard(worker)
-        worker.close()
 
 
 def _ask(worker: Worker, case: Case, limit: float, out: Path) -> Result:
@@ -355,24 +347,6 @@ def _ask(worker: Worker, case: Case, limit: float, out: Path) -> Result:
         if is_unwritable_here(out.parent, error):
             raise
         raise WorkerDied(Status.CRASHED, f"its process could not write a file any more ({error.reason})") from None
-
-
-def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float, out: Path) -> Result:
-    """Result of a case whose processor time is charged to the budget; beyond its share the case is left out."""
-    if budget is None:
-        return _ask(worker, case, limit, out)
-    used_before, ended = worker.used, False
-    if case.engine.steps:  # a reference by steps keeps what it has
-        case = dataclasses.replace(case, time_limit=min(case.time_limit, limit))
-    try:
-        return _ask(worker, case, limit, out)
-    except WorkerDied as error:
-        ended = True
-        if error.status is Status.TIMEOUT and limit < case.time_limit:
-            raise WorkerDied(Status.LEFT_OUT, budget.sentence) from None
-        raise
-    finally:
-        budget.end(case.key, worker.used - used_before, ended=ended)
 
 
 def result_without_answer(case: Case, error: ProofrollError) -> Result:

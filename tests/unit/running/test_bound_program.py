@@ -15,7 +15,7 @@ import proofroll
 from proofroll.running.bound_program import BoundProgram, printed_by
 
 # The modules that start processes, each of which ends with the process that started it; see test_process_end.
-_STARTERS = {f"running/{name}.py" for name in ("bound_program", "forked", "in_processes", "process")}
+_STARTERS = {f"running/{name}.py" for name in ("bound_program", "forked", "process", "process_end")}
 _STARTS = re.compile(
     r"\bsubprocess\.(Popen|run|call|check_\w+|get\w+)\b"
     r"|\bos\.(fork\w*|popen|system|posix_spawn\w*|spawn\w+|exec\w+)\b|\b(ProcessPoolExecutor|\w*\.?Process|\.Pool)\("

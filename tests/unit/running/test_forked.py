@@ -35,8 +35,8 @@ def cry(how):
     os._exit(3)
 """
 PROGRAM = """
-import json, signal, sys, tempfile
-from proofroll.running.forked import may_be_forked
+import json, signal, sys, tempfile, threading
+from proofroll.running.forked import begin_template, may_be_forked
 assert may_be_forked()
 from proofroll.core.errors import ProofrollError
 from proofroll.running.process import Worker
@@ -45,7 +45,11 @@ for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
 opened = tempfile.TemporaryFile()
 answers = []
 for forked, requests in json.loads(sys.argv[1]):
-    with Worker(forked=forked) as worker:
+    if forked:
+        begin_template()
+        threading.Thread(target=threading.Event().wait, daemon=True).start()
+    with Worker() as worker:
+        assert (type(worker._process).__name__ == "Forked") == forked
         for function, arguments in requests:
             try:
                 ask = {"do": "call", "function": f"probe:{function}", "arguments": arguments}
@@ -53,6 +57,28 @@ for forked, requests in json.loads(sys.argv[1]):
             except ProofrollError as error:
                 answers.append(str(error))
 print(json.dumps(answers))
+"""
+
+
+LONE = """
+import os
+from proofroll.core.errors import ProofrollError
+from proofroll.running.forked import begin_template
+from proofroll.running.memory import descendants
+
+begin_template()
+
+from proofroll.running.process import Worker
+
+killing = ["kill", "-9", str(descendants(os.getpid())[0])]
+asked = {"do": "call", "function": "subprocess:run", "arguments": {"args": killing}}
+with Worker() as worker:
+    try:
+        print(worker.request(asked, 60))
+    except ProofrollError as error:
+        print(error)
+with Worker() as worker:
+    print(worker.request({"do": "call", "function": "builtins:dict", "arguments": {"lives": 1}}, 60))
 """
 
 
@@ -72,9 +98,12 @@ def answers(folder: Path, *workers: tuple[bool, list[tuple[str, dict[str, str]]]
 
 @pytest.mark.drill
 def test_a_forked_worker_begins_as_a_started_one(tmp_path: Path) -> None:
-    """It has the path, folder, variables, signals, session and open files of a worker in a new interpreter."""
-    forked, started = answers(tmp_path, (True, [("seen", {})]), (False, [("seen", {})]))
-    assert forked == started
+    """It has the path, folder, variables, signals, session and open files of a worker in a new interpreter.
+
+    Also while other threads run in the process that asks for it.
+    """
+    started, *forked = answers(tmp_path, (False, [("seen", {})]), (True, [("seen", {})]), (True, [("seen", {})]))
+    assert forked == [started, started]
 
 
 @pytest.mark.drill
@@ -88,6 +117,18 @@ def test_a_forked_worker_ends_in_words(tmp_path: Path) -> None:
     assert isinstance(seen, dict)
 
 
+@pytest.mark.drill
+def test_workers_start_anew_where_their_template_was_killed(tmp_path: Path) -> None:
+    """Its workers end with it, in words, and those that are asked for later are started."""
+    done = subprocess.run(
+        [sys.executable, "-c", LONE], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    first, second = done.stdout.splitlines()
+    assert first.startswith("the engine's process was killed by SIGKILL")
+    assert second == "{'lives': 1}"
+
+
 def test_only_a_process_with_one_thread_forks() -> None:
     """A process that has numpy, whose libraries may have started threads, starts its workers."""
     import numpy as np
@@ -97,9 +138,18 @@ def test_only_a_process_with_one_thread_forks() -> None:
 
 
 @pytest.mark.drill
-def test_a_run_starts_no_other_interpreter(tmp_path: Path) -> None:
-    """The command forks its worker from itself once it has read the scene, which halves the cost of a short run."""
-    program = """
+@pytest.mark.parametrize(
+    "words",
+    [
+        "run pendulum --engine projection --until 0.1",
+        "compare pendulum --engine projection --until 0.1",
+        "recommend pendulum --engine projection",
+        "watch pendulum --engine projection --once",
+    ],
+)
+def test_a_command_starts_no_other_interpreter(tmp_path: Path, words: str) -> None:
+    """It forks its workers from modules that it needs itself, which halves the cost of a comparison."""
+    program = f"""
 import subprocess, sys
 from proofroll.cli import main
 
@@ -107,11 +157,11 @@ def refuse(*_, **__):
     raise OSError("an interpreter was started")
 
 subprocess.Popen.__init__ = refuse
-sys.argv = "proofroll run pendulum --engine projection --until 0.1".split()
+sys.argv = "proofroll {words}".split()
 main()
 """
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
     )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "projection" in done.stdout
+    assert done.returncode == 0, done.stderr
+    assert "projection" in done.stdout + done.stderr

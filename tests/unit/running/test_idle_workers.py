@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -48,6 +50,18 @@ def test_a_prepared_worker_serves_the_engine_and_a_wrong_name_is_left_to_who_ask
         prepare(name, workers)
         with workers.lend(name) as worker:
             assert worker._asked == asked
+    workers.close()
+
+
+def test_the_last_worker_of_an_engine_is_lent_again() -> None:
+    """One thread that measures an engine again and again has one process, though the pool has more of that engine."""
+    workers = Workers()
+    idle: list[Any] = [Mock(), Mock(), Mock()]
+    for name, worker in zip(("truth", "truth", "projection"), idle, strict=True):
+        workers.keep(name, worker)
+    for _ in range(2):
+        with workers.lend("truth") as worker:
+            assert worker is idle[1]
     workers.close()
 
 

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="th
 POOL = """
 import sys, time
 from pathlib import Path
-from proofroll.running.in_processes import process_pool
+from proofroll.running.process_end import process_pool
 
 if __name__ == "__main__":
     with process_pool(2) as pool:
@@ -62,9 +62,10 @@ program.wait()
 FORKED = """
 import sys
 from pathlib import Path
-from proofroll.running.forked import may_be_forked
+from proofroll.running.forked import begin_template, may_be_forked
 
 assert may_be_forked()
+begin_template()
 from proofroll.running.process import Worker
 
 begun = Path(sys.argv[1])
@@ -77,7 +78,7 @@ subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
 Path(__file__).with_name("begun").touch()
 ctypes.PyDLL(None).sleep(600)
 ''')
-Worker(forked=True).ask({"do": "call", "function": "runpy:run_path", "arguments": {"path_name": str(engine)}}, 600)
+Worker().ask({"do": "call", "function": "runpy:run_path", "arguments": {"path_name": str(engine)}}, 600)
 """
 HOLDER = """
 import os, subprocess, sys

@@ -157,7 +157,7 @@ def test_an_error_in_progress_ends_the_run(tmp_path: Path, make_case: MakeCase) 
     runner = Runner(Store(tmp_path), jobs=2)
     with pytest.raises(KeyboardInterrupt):
         runner.run([make_case("hangs"), make_case("oracle")], interrupt)
-    assert not runner._busy
+    assert all(worker._ended() for worker in runner.workers._made)
 
 
 @pytest.mark.drill

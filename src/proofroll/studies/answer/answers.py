@@ -18,7 +18,6 @@ from proofroll.running.engine_questions import on_scene, resolve_with_truth
 from proofroll.running.identity import libraries
 from proofroll.running.process import processor_seconds
 from proofroll.running.runner import Runner
-from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.time_budget import TIMING
 from proofroll.running.timing import time_in_rounds
 from proofroll.studies.answer.judged_run import JudgedRun
@@ -191,13 +190,13 @@ def speeds_alone(
     What was measured for another tolerance is not measured again.
     """
     speeds, runner, tasks = abreast.speeds, abreast.runner, {}
-    with Stopwatch(runner.workers) as stopwatch, runner.profile.phase(TIMING):
+    with runner.profile.phase(TIMING):
         for spec, (item, run) in runs.items():
             if spec in speeds:
                 continue
             facts = at_step(item.facts, run.step)
             case = question.case(facts, question.every, item.caps.run, item.allowed)
-            tasks[spec] = partial(stopwatch, case, _SECONDS)
+            tasks[spec] = partial(runner.workers.speed, case, _SECONDS)
         timings = time_in_rounds(tasks, _ROUNDS, once_above=_ONCE) if tasks else {}
     speeds |= {spec: min(*timing.values, runs[spec][1].cost) for spec, timing in timings.items()}
     return {spec: speeds[spec] for spec in runs if spec in speeds}

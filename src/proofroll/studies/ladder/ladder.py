@@ -22,7 +22,6 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.engine_questions import describe_each, on_scene, resolve, resolve_with_truth
 from proofroll.running.process import status_of
 from proofroll.running.runner import Runner
-from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, time_in_rounds
 from proofroll.studies.cases import case_of, length_of, require_length
 from proofroll.studies.judging import run_values
@@ -185,12 +184,12 @@ class Ladder:
 
     def _time(self, progress: Callable[[str], None]) -> None:
         timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}
-        with Stopwatch(self._runner.workers) as stopwatch:
-            timings = time_in_rounds(
-                {key: partial(stopwatch, case) for key, case in timed.items() if case is not None},
-                self._rounds,
-                lambda _: progress("timing"),
-            )
+        speed = self._runner.workers.speed
+        timings = time_in_rounds(
+            {key: partial(speed, case) for key, case in timed.items() if case is not None},
+            self._rounds,
+            lambda _: progress("timing"),
+        )
         for key, timing in timings.items():
             self.answers[key] = dataclasses.replace(self.answers[key], timing=timing)
 

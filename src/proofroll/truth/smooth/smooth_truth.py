@@ -102,7 +102,7 @@ class _SmoothTruth:
         if self._exact is None and analyse(self._mechanism).singular_start:
             raise Refused("the start is a singular pose, where the motion may branch, and no closed form is known")
         if self._exact is not None:
-            self._from_form(self._exact, self._seconds)  # it has finite numbers
+            _moves_of(self._exact, self._seconds)  # they are finite
         check_start(self._equations, self._second, self._units.length)
         try:
             return self._by_routes_or_form()
@@ -269,17 +269,8 @@ class _SmoothTruth:
         return on_same_turns(self._mechanism, replace(record, q=np.array(near).T), record)
 
     def _from_form(self, form: ClosedForm, seconds: Array) -> Record:
-        """Record of a closed form at times [s].
-
-        Raises:
-            Refused: its numbers are not finite.
-        """
-        assert form.motion is not None
-        moves, equations = form.motion(seconds), JointCoordinates(self._mechanism, self._equations.rank)
-        if not all(np.all(np.isfinite(values)) for values in moves):
-            raise Refused(
-                "its closed form has no finite numbers here: masses, lengths or gravity are too large or too small"
-            )
+        """Record of a closed form at times [s]."""
+        moves, equations = _moves_of(form, seconds), JointCoordinates(self._mechanism, self._equations.rank)
         return record_of(seconds, [equations.sample(q, v) for q, v in zip(*moves, strict=True)])
 
     def _in_seconds(self, record: Record) -> Record:
@@ -420,6 +411,17 @@ class _SmoothTruth:
             middle = (start + end) / 2
             start, end = (start, middle) if fails(np.array([middle])) else (middle, end)
         return end
+
+
+def _moves_of(form: ClosedForm, seconds: Array) -> tuple[Array, Array]:
+    """Coordinates and velocities of a closed form at times [s]. Raises Refused where they are not finite."""
+    assert form.motion is not None
+    moves = form.motion(seconds)
+    if not all(np.all(np.isfinite(values)) for values in moves):
+        raise Refused(
+            "its closed form has no finite numbers here: masses, lengths or gravity are too large or too small"
+        )
+    return moves
 
 
 def _apart_in_fields(mechanism: Mechanism, record: Record, second: Record, part: float = 1.0) -> dict[str, Array]:

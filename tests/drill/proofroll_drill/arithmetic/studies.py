@@ -11,7 +11,7 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.files.toml import named_file, study_files, study_of
 from proofroll.papers.blajer_2006.slip.regimes import load_regimes, regime_maps
 from proofroll.report.ladder import ladder_content
-from proofroll.running import stopwatch
+from proofroll.running import idle_workers
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.studies.ladder.ladder import Ladder
@@ -60,7 +60,7 @@ def is_study(name: str) -> bool:
 
 def decided_by(name: str, runner: Runner) -> dict[str, Any]:
     """Decisions of a study, as the record of a comparison; brief where it can be."""
-    stopwatch.SECONDS = _SHORT
+    idle_workers.SECONDS = _SHORT
     found = Decided()
     if name.startswith(LADDER):
         _ladder(name.removeprefix(LADDER), runner, found)

@@ -359,6 +359,8 @@ class ContactDynamics:
         time: float = 0.0,
         sideways: Array | None = None,
         features: Features | None = None,
+        *,
+        margin: bool = True,
     ) -> tuple[Array, Array, float]:
         """Velocities after an impact, by Newton's law of restitution and Coulomb's law with the slip after the impact.
 
@@ -370,6 +372,7 @@ class ContactDynamics:
             time: of the impact, for messages [s].
             sideways: tangential restitution of each of them; None: none has any.
             features: of solids that touch; None: the nearest.
+            margin: False: it is not asked for, and inf, which takes half the time.
 
         Returns:
             The velocities, the impulses (contacts, 3), the margin to another outcome: inf, or 0 if it is not unique.
@@ -384,10 +387,12 @@ class ContactDynamics:
         sideways = np.zeros(len(closed_contacts)) if sideways is None else sideways
         c = returning(J @ v, restitution, sideways)
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed_contacts]
-        sliding, numbers = [None] * len(closed_contacts), list(closed_contacts)
-        impulse, done, same = robust_forces(
-            G, c, self.friction[numbers], sliding, names, None, time, _NO_IMPULSE, self._static[numbers]
-        )
+        numbers = list(closed_contacts)
+        law, static = (self.friction[numbers], [None] * len(numbers), names, None, time), self._static[numbers]
+        if margin:
+            impulse, done, same = robust_forces(G, c, *law, _NO_IMPULSE, static)
+        else:
+            (impulse, done), same = contact_forces(G, c, *law, static=static), True
         speeds, scale = (J @ v)[::3], float(np.abs(J @ v).max())
         hit = (speeds < -TOUCHING * scale) | (impulse[:, 0] > TOUCHING * impulse[:, 0].max())
         lossy = np.array([bool(self.contacts[k].friction or self.contacts[k].restitution) for k in closed_contacts])

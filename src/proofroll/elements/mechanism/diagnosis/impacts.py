@@ -270,7 +270,7 @@ def _missed(model: Mechanism | None, impacts: Sequence[_Struck], convex: bool = 
         for _ in range(_CONTRACTIONS if convex else 1):
             e = np.array([contact.restitution + (contact.friction * slip / comes if slip else 0.0)])
             try:
-                v_out, _, _ = dynamics.struck(impact.q, impact.before, [impact.contact], e)
+                v_out, _, _ = dynamics.struck(impact.q, impact.before, [impact.contact], e, margin=False)
             except NotUnique:
                 return np.full(1, np.inf)
             slip = float(np.linalg.norm(np.cross(n, J @ v_out)))

@@ -20,7 +20,7 @@ from proofroll.files.toml import study_file
 from proofroll.papers.blajer_2006.ball.as_body import rolling_ball
 from proofroll.papers.blajer_2006.ball.model import RollingBall
 from proofroll.papers.blajer_2006.truth.regimes import Regime, analytic_boundaries, classify
-from proofroll.running.in_processes import in_processes
+from proofroll.running.process_end import in_processes
 
 if TYPE_CHECKING:
     import xarray as xr

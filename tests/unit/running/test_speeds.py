@@ -10,7 +10,6 @@ import pytest
 
 from proofroll.running.idle_workers import Workers
 from proofroll.running.process import Worker
-from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.time_case import time_once
 from proofroll.studies.cases import single_case
 
@@ -20,22 +19,21 @@ def test_what_is_measured_is_a_run_of_the_case(install_engines: Callable[[Mappin
     """The cost is that of an engine that takes its time: wall seconds per simulated second, as many as it sleeps."""
     install_engines({"sleepy": "tiny:Sleepy"})
     case = single_case("sphere_in_cylinder", {}, "sleepy[dt=0.01]", until=0.02, every=0.02, time_limit=60)
-    with Stopwatch() as stopwatch:
-        cost = stopwatch(case, seconds=0.01)
+    cost = Workers().speed(case, seconds=0.01)
     assert cost is not None
     assert cost >= 1.0, "it sleeps for a second in each simulated one; on a busy machine it may take longer"
 
 
 @pytest.mark.drill
 def test_what_cannot_be_built_has_no_speed() -> None:
-    """An engine that refuses the scene gives None, and the stopwatch goes on with other cases."""
+    """An engine that refuses the scene gives None, and other cases are measured."""
     refused = single_case(
         "sphere_in_cylinder", {"mu_static": 0.3}, "exudyn[formulation=carrier]", until=0.1, every=0.1, time_limit=60
     )
     good = single_case("sphere_in_cylinder", {}, "exudyn[formulation=carrier]", until=0.1, every=0.1, time_limit=60)
     broken = dataclasses.replace(good, engine=dataclasses.replace(good.engine, name="nothing"))
-    with Stopwatch() as stopwatch:
-        assert [stopwatch(case, 0.01) is None for case in (refused, broken, good)] == [True, True, False]
+    workers = Workers()
+    assert [workers.speed(case, 0.01) is None for case in (refused, broken, good)] == [True, True, False]
 
 
 @pytest.mark.drill
@@ -58,8 +56,8 @@ def test_an_interrupted_worker_is_not_lent_again() -> None:
             raise KeyboardInterrupt
 
     workers.keep("truth", Interrupted())
-    with pytest.raises(KeyboardInterrupt), Stopwatch(workers) as stopwatch:
-        stopwatch(case)
+    with pytest.raises(KeyboardInterrupt):
+        workers.speed(case)
     with workers.lend("truth") as worker:
         assert not isinstance(worker, Interrupted)
     workers.close()
