@@ -37,7 +37,7 @@ RUN_BY = {
     "cli/new.py: proofroll run {} --engine truth": ["test_what_is_written_anew_can_be_used_as_proposed"],
     "cli/new.py: proofroll compare {}": ["test_what_is_written_anew_can_be_used_as_proposed"],
     "cli/new.py: proofroll check --keys WORD": [WORDS],
-    "cli/replay.py: proofroll run --out or of a report, or names of run --keep": [WORDS],
+    "cli/written_files.py: proofroll run --out or of a report, or names of run --keep": [WORDS],
     "cli/report.py: proofroll report": ["test_lines_of_a_page"],
     "cli/run.py: proofroll compare": ["test_a_run_is_compared_as_it_was"],
     "cli/run.py: proofroll replay lists and shows what is kept.": [WORDS],

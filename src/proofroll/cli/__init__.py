@@ -21,17 +21,16 @@ from proofroll.cli.command_groups import NOW, GroupedCommands
 from proofroll.cli.comparing import compare
 from proofroll.cli.diff import diff
 from proofroll.cli.engines import engines
-from proofroll.cli.export import export
 from proofroll.cli.judge import judge
 from proofroll.cli.lists import cite, findings, scenes
 from proofroll.cli.new import new
 from proofroll.cli.options import ENGINE, INTERRUPTED, OK, USAGE, complain
 from proofroll.cli.recommend import recommend
-from proofroll.cli.replay import replay
 from proofroll.cli.report import report
 from proofroll.cli.run import run
 from proofroll.cli.studies import ladder, stability
 from proofroll.cli.watch import watch
+from proofroll.cli.written_files import export, replay
 from proofroll.core.entry_points import broken, leave_out, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError, choices
 from proofroll.report.terminal.printable import spelled_out

@@ -103,8 +103,7 @@ def report(
     left_out = [] if studies or only or budget else further_comparison_names()
     all_names = [*comparison_names(), *([] if left_out else further_comparison_names())]
     names, parts = parts_of(studies, engine or [], out) if studies else (all_names, all_parts(engine or [], out))
-    if only:
-        names, parts = _of_groups(names, only), []
+    names, parts = (_of_groups(names, only), []) if only else (names, parts)
     if assigned and (parts or not studies):
         raise InputError(
             "--set", next(iter(assigned)), "studies have their own points; name scenes or robot files alone"
