@@ -108,7 +108,7 @@ def test_a_truth_that_was_cut_is_not_stored(tmp_path: Path) -> None:
 
 
 CHECKS = {
-    "transitions": ("bouncing_ball", {"restitution": 0.7}, held_to_laws, "transition", 3.0),
+    "transitions": ("bouncing_ball", {"restitution": 0.7}, held_to_laws, "transition", 4.0),
     "witness of a closed form": ("four_bar", {}, JointCoordinates, "rk4_states", 0.1),
 }
 

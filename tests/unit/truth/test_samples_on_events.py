@@ -5,7 +5,9 @@ import pytest
 
 from proofroll.core.events import EventKind
 from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.run.element import the_mechanism
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.files.scene_file import load_scene
 from proofroll.truth.truth_of_mechanism import truth_of
 
 DOWN = np.array([-0.37208365159161944, -0.3438637275758072, -0.8621551444351054])
@@ -46,3 +48,14 @@ def test_a_sample_on_an_impact_is_known_where_rebounds_are_summed_later(last_dig
     found = truth_of(dropped(0.1), np.array([0.0, sample, 0.3]))
     assert any(event.kind == EventKind.SETTLE for event in found.events)
     assert found.bars["v_WB"][-1] < 1e-11
+
+
+@pytest.mark.nightly
+def test_a_sample_on_a_turn_of_a_slip_has_the_force_after_it() -> None:
+    """Both routes give the friction of one side, so that its bar stays round-off, though friction jumps."""
+    mechanism = the_mechanism(load_scene("falling_rod")).mechanism
+    turn = next(event.time for event in truth_of(mechanism, np.array([0.0, 0.9])).events if event.kind == "turn")
+    found = truth_of(mechanism, np.array([0.0, turn, 0.9]))
+    assert found.pressed is not None
+    assert found.pressed[1, 0, 0] < -0.5  # N
+    assert found.bars["pressed"].max() < 1e-11
