@@ -24,17 +24,9 @@ if TYPE_CHECKING:
     from proofroll.studies.swept_settings import SweptSetting
 
 SYMBOLS = {
-    "agrees": "✓",
-    "unconfirmed": "○",
-    "incomplete": "◐",
-    "converges": "↘",
-    "ill-posed": "?",
-    "not-judged": "□",
-    "another-scene": "◇",
-    "refused": "⊘",
-    "differs": "✗",
-    "failed": "!",
-}
+    "agrees": "✓", "unconfirmed": "○", "incomplete": "◐", "converges": "↘", "ill-posed": "?", "not-judged": "□",
+    "another-scene": "◇", "refused": "⊘", "differs": "✗", "failed": "!",
+}  # fmt: skip
 INSTALLED = "as installed"
 MEANINGS = {
     "agrees": "within tolerance at this step; where there is a ladder of steps, so is its limit",

@@ -32,17 +32,9 @@ _WIDEST = 8  # largest number of spreads that are listed
 _COMPILES = 10.0  # s before the first step, beyond which the time is told; to compile equations takes one or two
 _HOLDS = (Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.INCOMPLETE)
 STYLES = {
-    "agrees": "green",
-    "unconfirmed": "yellow",
-    "incomplete": "yellow",
-    "converges": "yellow",
-    "ill-posed": "cyan",
-    "not-judged": "cyan",
-    "another-scene": "cyan",
-    "refused": "magenta",
-    "differs": "red",
-    "failed": "bold red",
-}
+    "agrees": "green", "unconfirmed": "yellow", "incomplete": "yellow", "converges": "yellow", "ill-posed": "cyan",
+    "not-judged": "cyan", "another-scene": "cyan", "refused": "magenta", "differs": "red", "failed": "bold red",
+}  # fmt: skip
 # Verdict -> words of the closing count for one setting and for several.
 _COUNTS = {
     Verdict.AGREES: ("agrees", "agree"),

@@ -30,18 +30,9 @@ from proofroll.elements.mechanism.scene.signal import Table, read_signal
 from proofroll.elements.mechanism.scene.spring_law import read_spring_law
 
 KINDS: dict[str, type[Any]] = {
-    "bodies": Body,
-    "joints": Joint,
-    "loops": Loop,
-    "springs": Spring,
-    "bushings": Bushing,
-    "forces": Force,
-    "points": Point,
-    "geometries": Geometry,
-    "pairs": Pair,
-    "actuators": Actuator,
-    "couplings": Coupling,
-}
+    "bodies": Body, "joints": Joint, "loops": Loop, "springs": Spring, "bushings": Bushing, "forces": Force,
+    "points": Point, "geometries": Geometry, "pairs": Pair, "actuators": Actuator, "couplings": Coupling,
+}  # fmt: skip
 strict(*KINDS.values(), *COMPOSED.values(), SprungJoint, Cable, Table)
 _MOST = 10_000  # largest number of repetitions: more are taken for a typing error
 

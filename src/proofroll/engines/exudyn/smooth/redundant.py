@@ -27,19 +27,10 @@ from proofroll.engines.exudyn.smooth.connections import Connections, add_forces,
 from proofroll.engines.exudyn.smooth.joint_laws import JointLaws
 
 _OF_JOINTS = {
-    MechanismCapability[name]
-    for name in (
-        "JOINT_FRICTION",
-        "STOPS",
-        "ACTUATORS",
-        "SATURATION",
-        "SIGNALS",
-        "HELD",
-        "COUPLINGS",
-        "ARMATURE",
-        "MOTIONS",
+    MechanismCapability[name] for name in (
+        "JOINT_FRICTION", "STOPS", "ACTUATORS", "SATURATION", "SIGNALS", "HELD", "COUPLINGS", "ARMATURE", "MOTIONS",
     )
-}
+}  # fmt: skip
 PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS | {MechanismCapability.REDUNDANT})
 LACKING: Mapping[str, str] = {
     MechanismCapability.REBOUNDS: "its stops are springs with dampers, which have no coefficient of restitution"

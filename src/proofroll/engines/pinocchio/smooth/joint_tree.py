@@ -22,20 +22,11 @@ from proofroll.elements.mechanism.scene.rotations import Array
 from proofroll.elements.mechanism.scene.signal import value_at, varies
 
 _OF_JOINTS = {
-    MechanismCapability[name]
-    for name in (
-        "REDUNDANT",
-        "ARMATURE",
-        "ACTUATORS",
-        "SATURATION",
-        "SIGNALS",
-        "HELD",
-        "COUPLINGS",
-        "COUPLINGS_OF_MANY",
-        "MASSLESS",
-        "MOTIONS",
+    MechanismCapability[name] for name in (
+        "REDUNDANT", "ARMATURE", "ACTUATORS", "SATURATION", "SIGNALS", "HELD", "COUPLINGS", "COUPLINGS_OF_MANY",
+        "MASSLESS", "MOTIONS",
     )
-}
+}  # fmt: skip
 PROVIDES: frozenset[str] = ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS
 LACKING: Mapping[str, str] = {
     MechanismCapability[name]: "these equations have no law that switches"

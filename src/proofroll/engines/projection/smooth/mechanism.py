@@ -39,34 +39,14 @@ from proofroll.engines.projection.settings import ProjectionSettings
 from proofroll.engines.projection.smooth.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.smooth.recursion import compiled
 
-PROVIDES = frozenset(
-    ALL_JOINTS
-    | ALL_LOOPS
-    | ALL_SHAPES
-    | FORCES
-    | {
-        MechanismCapability.REDUNDANT,
-        MechanismCapability.COUPLINGS,
-        MechanismCapability.COUPLINGS_OF_MANY,
-        MechanismCapability.ACTUATORS,
-        MechanismCapability.SATURATION,
-        MechanismCapability.SIGNALS,
-        MechanismCapability.HELD,
-        MechanismCapability.MOTIONS,
-        MechanismCapability.ARMATURE,
-        MechanismCapability.JOINT_FRICTION,
-        MechanismCapability.STOPS,
-        MechanismCapability.REBOUNDS,
-        MechanismCapability.CONTACT,
-        MechanismCapability.CONTACT_FRICTION,
-        MechanismCapability.UNBOUNDED_FRICTION,
-        MechanismCapability.STATIC_FRICTION,
-        MechanismCapability.SLIP_REBOUNDS,
-        MechanismCapability.CONTACT_REBOUNDS,
-        MechanismCapability.TURNING_FRICTION,
-        MechanismCapability.ORIENTATION,
-    }
-)
+_FURTHER = {
+    MechanismCapability[name] for name in (
+        "REDUNDANT", "COUPLINGS", "COUPLINGS_OF_MANY", "ACTUATORS", "SATURATION", "SIGNALS", "HELD", "MOTIONS",
+        "ARMATURE", "JOINT_FRICTION", "STOPS", "REBOUNDS", "CONTACT", "CONTACT_FRICTION", "UNBOUNDED_FRICTION",
+        "STATIC_FRICTION", "SLIP_REBOUNDS", "CONTACT_REBOUNDS", "TURNING_FRICTION", "ORIENTATION",
+    )
+}  # fmt: skip
+PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | ALL_SHAPES | FORCES | _FURTHER)
 # Regularity of the loops' rows, relative to the largest so far, that counts as singular: accelerations lose as many
 # digits as it has zeros. It is about a hundredth for loops that miss a singular pose by a hundredth of a radian.
 SINGULAR = 1e-6
