@@ -202,7 +202,7 @@ def _softened(rows: AirRows, law: ControlLaw, robot: AirRobot) -> bool:
     columns = rows.by_joint["friction"][:, rubbing].reshape(-1, rows.freedoms, np.count_nonzero(rubbing))
     more = np.einsum("rij,rj->ri", np.linalg.pinv(columns), rows.left.reshape(-1, rows.freedoms))
     sizes = np.linalg.norm(columns, axis=1)
-    near = SAFETY * rows.rounding / sizes[sizes > 0].min() + ROUND_OFF
+    near = SAFETY * rows.rounding / sizes[sizes > 0].min(initial=np.inf) + ROUND_OFF
     within = np.all((more <= near) & (more >= -2 * friction[rubbing] - near))
     left = rows.left - np.einsum("rij,rj->ri", columns, more).ravel()
     return bool(within and rows.rounded(left) and np.mean(np.abs(more) <= near) >= _BOUND)

@@ -209,7 +209,7 @@ def _roundings(columns: Mapping[str, Array]) -> dict[str, Array]:
     places = max(-int(number.exponent) for number in written)
     digits = max(len(number.digits) for number in written)
     decimals = 0.5 * 10.0**-places if places <= _DECIMALS else 0.0
-    singles = {name: _is_single(column, digits) for name, column in columns.items()}
+    singles = {name: _is_single(column) for name, column in columns.items()}
     all_single = all(singles.values())
 
     def rounding(name: str, column: Array) -> Array:
@@ -227,10 +227,11 @@ def _roundings(columns: Mapping[str, Array]) -> dict[str, Array]:
     return {name: rounding(name, column) for name, column in columns.items()}
 
 
-def _is_single(values: Array, digits: int) -> bool:
+def _is_single(values: Array) -> bool:
     """True if all values are of single precision, written in full, to a number of digits or to the fewest that do."""
     with np.errstate(over="ignore"):
         singles = values.astype(np.float32)
+    digits = max(len(Decimal(repr(value)).normalize().as_tuple().digits) for value in values.tolist())
     for value, single in zip(values.tolist(), singles.tolist(), strict=True):
         if value != single and value not in {float(str(np.float32(single))), float(f"{single:.{digits}g}")}:
             return False
