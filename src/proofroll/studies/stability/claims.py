@@ -159,7 +159,7 @@ def file_for(scene: str) -> StabilityFile:
     Raises:
         InputError: there is no such scene, or the file is broken.
     """
-    named = None if is_scene(scene) else named_file(scene)
+    named = None if is_scene(scene) else named_file(scene) or (Path(scene) if Path(scene).suffix == ".toml" else None)
     about = (path for path, content in study_files(STUDY) if content.get("scene") == scene)
     path = named or next(about, None)
     if path is not None:
