@@ -164,7 +164,7 @@ def test_a_map_of_ones_own_is_made_by_its_command(mine: Path) -> None:
     assert sorted(lines) == [["proofroll", "stability", name, *asked] for name in names]
     assert [file_for(name).name for name in names] == ["a map", "stability_bounce"]
     assert file_for("a map.toml").axes[0].values == [0.5, 1.0]
-    with pytest.raises(InputError, match="there is no such scene"):
+    with pytest.raises(InputError, match="the file cannot be read"):
         file_for("no map.toml")
 
 
