@@ -93,8 +93,8 @@ def judge(
         options.write_json(judged.content())
     else:
         seconds = time_limit if time_limit != RUN_TIME_LIMIT else None
-        given = {"set": settings, "tolerance": tolerance, "because": because, "time_limit": seconds}
-        asked = command_line("judge", str(run), scene=told, **given)
+        choices = {"set": settings, "tolerance": tolerance, "because": because, "time_limit": seconds}
+        asked = command_line("judge", str(run), scene=told, **choices)
         lines = _lines(judged, run.name, asked, _names(columns), everything=everything)
         options.show_lines(lines, widest=WIDTH)
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)

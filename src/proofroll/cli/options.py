@@ -188,8 +188,8 @@ def begin_workers(*, judges: bool = True) -> None:
     from proofroll.running.forked import begin_template
 
     kinds = [point.module for point in announced("proofroll.elements") if point.module.startswith("proofroll.")]
-    own = "proofroll.core.first_steps", "proofroll.running.recording", "proofroll.running.worker"
-    begin_template(*own, *kinds, "scipy.optimize" if judges else "scipy.spatial.transform")
+    modules = "proofroll.core.first_steps", "proofroll.running.recording", "proofroll.running.worker"
+    begin_template(*modules, *kinds, "scipy.optimize" if judges else "scipy.spatial.transform")
 
 
 def new_runner(

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.engine_abilities import OwnOptions
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, number
-from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, SHORTEST_TIME_CONSTANT
+from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, OF_ROWS, SHORTEST_TIME_CONSTANT
 from proofroll.robots.files.robot_file import read_xml
 
 # Integrators that the adapter has, by their number in MuJoCo.
@@ -23,7 +23,6 @@ _READ = {"integrator", "timestep", "cone", "gravity", "density", "viscosity", "d
 _READ |= {"impratio", "sleep_tolerance", "wind", "magnetic", "enableflags", "jacobian"}
 _READ |= {f"{family}_{what}" for family in ("o", "ccd", "sdf") for what in ("friction", "margin", "solref", "solimp")}
 _READ |= {"ccd_iterations", "ccd_tolerance", "sdf_iterations", "sdf_initpoints"}
-_OF_ROWS = ("iterations", "noslip_iterations", "solver")
 _FINER = 4  # part of the file's step that is tried
 _SOLVERS = {name.upper(): name for name in ("PGS", "CG", "Newton")}
 _HARD = {"time_constant": str(SHORTEST_TIME_CONSTANT), "impedance": str(LARGEST_IMPEDANCE)}
@@ -54,7 +53,7 @@ def own_options(path: Path) -> OwnOptions | None:
     solver = mujoco.mjtSolver(int(option.solver)).name.removeprefix("mjSOL_")
     words = {"solver": f"solver {solver}", "iterations": counted(int(option.iterations), "iterations")}
     clauses = {key: words.get(key, f"{key} {getattr(option, key):g}") for key in unlike}
-    of_rows = [clauses.pop(key) for key in _OF_ROWS if key in clauses]
+    of_rows = [clauses.pop(key) for key in OF_ROWS if key in clauses]
     others = list(clauses.values())
     bits = mujoco.mjtDisableBit
     others += [f"flag {word}" for name, word in _FLAGS.items() if option.disableflags & getattr(bits, f"mjDSBL_{name}")]

@@ -32,11 +32,11 @@ POSITIONS_TIME_CONSTANT = 2.25
 UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
 # Options of the solver of loops, couplings, stops, dry friction and contacts.
-_OF_ROWS = ("solver", "iterations", "noslip_iterations")
+OF_ROWS = ("solver", "iterations", "noslip_iterations")
 # Settings that not every formulation has, by formulation.
 _OWN: Mapping[str, tuple[str, ...]] = {
-    "joints": ("damping_armature", *_OF_ROWS),
-    "geoms": ("damping_armature", "cone_correction", "cone", "curvature", "impratio", *_OF_ROWS),
+    "joints": ("damping_armature", *OF_ROWS),
+    "geoms": ("damping_armature", "cone_correction", "cone", "curvature", "impratio", *OF_ROWS),
 }
 _SOME = tuple(dict.fromkeys(name for names in _OWN.values() for name in names))
 

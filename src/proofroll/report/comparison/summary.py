@@ -96,7 +96,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         step_bound=step_bound(scene.elements, steps),
         omitted=list(scene.omitted),
         unfit=comparison.unfit,
-        unjudged=[] if comparison.budget is None else _unjudged(scene, comparison),
+        unjudged=[] if comparison.asked else _unjudged(scene, comparison),
     )
 
 
@@ -126,7 +126,7 @@ def _truth_ends(outcome: Outcome) -> list[str]:
         if reference.ended
     ]
     open_names = [name for name in bounds if not all(reference.determines(name) for reference in truths.values())]
-    if open_names and outcome.comparison.budget is not None and not by_steps:
+    if open_names and not outcome.comparison.asked and not by_steps:
         ends.append(f"Not determined by the equations, and so not judged: {', '.join(open_names)}.")
     return [*by_steps, *ends]
 

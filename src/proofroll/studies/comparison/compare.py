@@ -115,7 +115,7 @@ def _told(band: Band, comparison: Comparison, reference: Reference) -> Band:
 
     A truth whose error bar is larger than a tolerance leaves a row without judgement; a reference by steps does not.
     """
-    if comparison.budget is None:
+    if comparison.asked:
         return band
     told = {
         name: bound

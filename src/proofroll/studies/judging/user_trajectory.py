@@ -140,8 +140,8 @@ def read_run(run: RunInput, scene: Scene, columns: Mapping[str, str] | None = No
     state = [item.name for item in fields(scene.elements[0].sample_type) if item.name in dataset]
     completed = _completed(dataset, scene, times)
     # Reactions do not follow from the state: they are judged as they are given.
-    known = {name for name in names if name in completed and np.any(np.isfinite(completed[name].to_numpy()))}
-    kept = [name for name in names if name not in state and name not in known]
+    values = {name for name in names if name in completed and np.any(np.isfinite(completed[name].to_numpy()))}
+    kept = [name for name in names if name not in state and name not in values]
     besides: dict[str, str | None] = dict.fromkeys([name for name in names if name not in (*state, *kept)], FROM_STATE)
     besides |= dict.fromkeys((*state, *kept))  # the judged observables may be of some bodies' places alone
     return GivenRun(

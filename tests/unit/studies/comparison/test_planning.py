@@ -113,11 +113,12 @@ def test_the_step_of_a_file_divides_the_interval(own_step: float, duration: floa
 
 
 @pytest.mark.drill
-def test_what_is_not_determined_is_not_asked(tmp_path: Path) -> None:
+@pytest.mark.parametrize("budget", [60.0, None], ids=["compare", "report"])
+def test_what_is_not_determined_is_not_asked(tmp_path: Path, budget: float | None) -> None:
     """A first look at a box at rest judges its motion, and says that its corners share their forces in no known way."""
     made = first_look.default_comparison("pushed_box", {}, engines=["pinocchio"], until=0.05)
     bounds = {**made.bands["close"].bounds, "contact_forces": Tolerance(0.01, relative=True)}
-    made = dataclasses.replace(made, bands={"close": Band("a first look", bounds)})
+    made = dataclasses.replace(made, budget=budget, bands={"close": Band("a first look", bounds)})
     outcome = compare(made, Runner(Store(tmp_path)))
     (run,) = outcome.runs
     assert run.verdict is Verdict.AGREES
