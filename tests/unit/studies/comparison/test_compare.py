@@ -405,7 +405,7 @@ def test_reactions_without_a_tolerance_are_named(tmp_path: Path) -> None:
     compared = Comparison("fall", "", "", "gear_pair", 0.1, 0.05, bands=bands, rows=[free], budget=60.0)
     outcome = judged(tmp_path, compared, the_truth)
     assert {"forces", "torques", "coupling.*"} <= set(outcome_content(outcome).unjudged)
-    claimed = dataclasses.replace(outcome, comparison=dataclasses.replace(compared, budget=None))
+    claimed = dataclasses.replace(outcome, comparison=dataclasses.replace(compared, asked="fall.toml"))
     assert outcome_content(claimed).unjudged == []
 
 
