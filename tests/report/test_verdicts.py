@@ -26,7 +26,7 @@ from proofroll.report.labels import SYMBOLS, detail, verdict_text
 from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.html import page
 from proofroll.report.page.records import report_content
-from proofroll.report.terminal.verdicts import verdict_parts
+from proofroll.report.terminal.verdicts import answer_lines, verdict_parts
 from proofroll.running.case import Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import Outcome, Run
@@ -34,6 +34,7 @@ from proofroll.studies.comparison.outcome import Outcome, Run
 TRUE = np.sin(np.linspace(0, 2, 21))
 OTHER = Limit(TRUE + 0.05, 2e-4, 1.0)
 SCATTERED = richardson([TRUE + off for off in (0.05, -0.04, 0.06)], (4, 2, 1), 1)
+FALLING = richardson([TRUE + off for off in (0.1, 0.05, 0.028)], (4, 2, 1), 1)
 WRONG_WITHIN = Limit(TRUE + 4e-4, 1e-7, 2.0)
 
 
@@ -156,6 +157,17 @@ def test_another_limit_and_no_limit_are_two_answers_on_the_terminal(outcome: Out
     assert "smaller steps do not settle" in text
     assert "limit off by" not in text
     assert "order 1, limit off by 0.05 ± 2e-4 m" in told(content, orders=True)
+
+
+def test_errors_that_still_fall_are_not_said_to_stay(made: tuple[Outcome, Store]) -> None:
+    """Where errors fall with the step and its limit may be the truth, the step alone is called wrong."""
+    run = made[0].runs[0]
+    number = made[0].comparison.rows.index(run.row)
+    contents = [outcome_content(with_runs(made[0], {number: [answered(run, 0.1, at)]})) for at in (FALLING, OTHER)]
+    answers = [" ".join(answer_lines(content, [content.rows[number]])) for content in contents]
+    assert [" is wrong at this step: z is off by 0.1 m." in answer for answer in answers] == [True, False]
+    assert ["its limit needs smaller steps" in told(content) for content in contents] == [True, False]
+    assert "do not settle" not in told(contents[0])
 
 
 @pytest.mark.parametrize("width", [80, 100])

@@ -129,7 +129,8 @@ def answer_lines(content: ReportedComparison, rows: Sequence[ReportedRow]) -> li
     if wrong:
         title, off = ", ".join(row_words(wrong[0])), _off(wrong[0])
         several = f"{len(wrong)} settings are wrong; the worst, {title}: {off}."
-        lines.append(several if len(wrong) > 1 else f"{title}, is wrong: {off}.")
+        at_this_step = " at this step" if _is_open(wrong[0]) else ""
+        lines.append(several if len(wrong) > 1 else f"{title}, is wrong{at_this_step}: {off}.")
     nearest = min((row for row in rows if row.observables), key=_ratio, default=None)
     if agree:
         some = "The engine setting agrees" if len(rows) == 1 else f"{len(agree)} of {len(rows)} engine settings agree"
@@ -235,6 +236,7 @@ def _why(row: ReportedRow, runs: Sequence[ReportedRun]) -> str:
             clauses = ["its other steps were not run"]
         case Verdict.DIFFERS if worst is not None:
             text = _LIMITS.get(worst.limit) or f"{limit}smaller steps stay {_limit_off(worst)} off"
+            text = f"{limit}its limit needs smaller steps" if _is_open(row) else text
             clauses.append(text if math.isfinite(worst.error) else worst.reason.partition(";")[0])
         case Verdict.UNCONFIRMED:
             clauses.append("smaller steps do not confirm it")
@@ -259,6 +261,14 @@ def _limit_note(row: ReportedRow) -> str:
     item = max(shown, key=lambda item: (item.limit_error or 0.0) / item.tolerance)
     more = f" ({len(shown) - 1} more: --orders)" if len(shown) > 1 else ""
     return f"{symbol(item.observable)} agrees at this step only, its limit is {_limit_off(item)} off{more}"
+
+
+def _is_open(row: ReportedRow) -> bool:
+    """True if errors fall with the step, but its limit is known too badly to exclude the truth."""
+    worst = worst_of(row)
+    if worst is None or worst.limit is not LimitResult.NOT_SHOWN or worst.order is None:
+        return False
+    return worst.limit_error is not None and worst.limit_error <= worst.tolerance + (worst.limit_doubt or 0.0)
 
 
 def _limit_off(item: WorstJudgement) -> str:
