@@ -35,6 +35,7 @@ TRUE = np.sin(np.linspace(0, 2, 21))
 OTHER = Limit(TRUE + 0.05, 2e-4, 1.0)
 SCATTERED = richardson([TRUE + off for off in (0.05, -0.04, 0.06)], (4, 2, 1), 1)
 FALLING = richardson([TRUE + off for off in (0.1, 0.05, 0.028)], (4, 2, 1), 1)
+SHOWN = (FALLING, SCATTERED, OTHER)
 WRONG_WITHIN = Limit(TRUE + 4e-4, 1e-7, 2.0)
 
 
@@ -160,13 +161,13 @@ def test_another_limit_and_no_limit_are_two_answers_on_the_terminal(outcome: Out
 
 
 def test_errors_that_still_fall_are_not_said_to_stay(made: tuple[Outcome, Store]) -> None:
-    """Where errors fall with the step and its limit may be the truth, the step alone is called wrong."""
+    """Where the limit of small steps may be the truth, the step alone is called wrong; of an order more are asked."""
     run = made[0].runs[0]
     number = made[0].comparison.rows.index(run.row)
-    contents = [outcome_content(with_runs(made[0], {number: [answered(run, 0.1, at)]})) for at in (FALLING, OTHER)]
+    contents = [outcome_content(with_runs(made[0], {number: [answered(run, 0.1, at)]})) for at in SHOWN]
     answers = [" ".join(answer_lines(content, [content.rows[number]])) for content in contents]
-    assert [" is wrong at this step: z is off by 0.1 m." in answer for answer in answers] == [True, False]
-    assert ["its limit needs smaller steps" in told(content) for content in contents] == [True, False]
+    assert [" is wrong at this step: z is off by 0.1 m." in answer for answer in answers] == [True, True, False]
+    assert ["its limit needs smaller steps" in told(content) for content in contents] == [True, False, False]
     assert "do not settle" not in told(contents[0])
 
 

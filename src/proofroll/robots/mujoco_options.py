@@ -26,6 +26,7 @@ _READ |= {"ccd_iterations", "ccd_tolerance", "sdf_iterations", "sdf_initpoints"}
 _FINER = 4  # part of the file's step that is tried
 _SOLVERS = {name.upper(): name for name in ("PGS", "CG", "Newton")}
 _HARD = {"time_constant": str(SHORTEST_TIME_CONSTANT), "impedance": str(LARGEST_IMPEDANCE)}
+_RK4 = {"integrator": "RK4", "eulerdamp": "true", "damping_armature": "false"}  # the flags are of Euler alone
 _FLAGS = {"REFSAFE": "refsafe"}  # of rows, which no scene has
 
 
@@ -74,6 +75,8 @@ def own_options(path: Path) -> OwnOptions | None:
     explicit = euler and bool(option.disableflags & bits.mjDSBL_EULERDAMP)
     if euler and not explicit:
         switches["damping as armature in place of implicit"] = {"damping_armature": "true"}
+    if integrator != "RK4":
+        switches[f"RK4 in place of {integrator}"] = _RK4
     finer = option.timestep / _FINER
     switches[f"dt {number(finer, 3)} s in place of {number(option.timestep, 3)} s"] = {"dt": f"{finer:.12g}"}
     return OwnOptions(

@@ -236,7 +236,7 @@ def _why(row: ReportedRow, runs: Sequence[ReportedRun]) -> str:
             clauses = ["its other steps were not run"]
         case Verdict.DIFFERS if worst is not None:
             text = _LIMITS.get(worst.limit) or f"{limit}smaller steps stay {_limit_off(worst)} off"
-            text = f"{limit}its limit needs smaller steps" if _is_open(row) else text
+            text = f"{limit}its limit needs smaller steps" if limit and _is_open(row) else text
             clauses.append(text if math.isfinite(worst.error) else worst.reason.partition(";")[0])
         case Verdict.UNCONFIRMED:
             clauses.append("smaller steps do not confirm it")
@@ -264,9 +264,9 @@ def _limit_note(row: ReportedRow) -> str:
 
 
 def _is_open(row: ReportedRow) -> bool:
-    """True if errors fall with the step, but its limit is known too badly to exclude the truth."""
+    """True if the limit of small steps is known too badly to exclude the truth."""
     worst = worst_of(row)
-    if worst is None or worst.limit is not LimitResult.NOT_SHOWN or worst.order is None:
+    if worst is None or worst.limit is not LimitResult.NOT_SHOWN:
         return False
     return worst.limit_error is not None and worst.limit_error <= worst.tolerance + (worst.limit_doubt or 0.0)
 

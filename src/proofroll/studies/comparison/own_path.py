@@ -23,6 +23,7 @@ from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
 _MOST, _SECONDS = 20, 15.0  # runs, and processor time of them [s]
+_LESS = 0.99  # of an error that a switch at the end must leave at most, to be a step of its own
 _JUDGED = {Verdict.AGREES, Verdict.DIFFERS, Verdict.CONVERGES, Verdict.UNCONFIRMED}
 
 
@@ -56,7 +57,7 @@ def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
     seconds = _SECONDS if given is None else max(0.0, min(_SECONDS, given - spent))
     spec, runs, budget = parse_engine(run.row.engine), 0, TimeBudget(seconds)
     unit, options = spaced(reference.scene.observables[quantity].unit), dict(spec.options)
-    lines = []
+    steps, without_effect = list[tuple[str, float, float]](), list[str]()
     while left and error > bar and runs + len(left) <= _MOST:
         cases = _cases(run, spec.name, {words: {**options, **changes} for words, changes in left.items()}, runner)
         results = runner.run(cases.values(), budget=budget)
@@ -69,10 +70,17 @@ def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
         best = min(errors, key=lambda words: errors[words], default="")
         if not best:
             break
-        lines.append(f"  {best}: {number(error, 2)} → {number(errors[best], 2)}{unit}")
+        steps.append((best, error, errors[best]))
         options, error = {**options, **left.pop(best)}, errors[best]
+    while steps and steps[-1][2] > _LESS * steps[-1][1]:
+        words, error, _ = steps.pop()
+        without_effect.append(words)
     head = f"Options of the file, switched one after the other; worst error of {quantity} ({runs} runs):"
-    rest = f"  rest: {number(error, 2)}{unit}" + (f"; not tried: {'; '.join(left)}" if left else "")
+    lines = [f"  {words}: {number(before, 2)} → {number(after, 2)}{unit}" for words, before, after in steps]
+    rest = f"  rest: {number(error, 2)}{unit}" + (
+        f"; no less by: {'; '.join(without_effect)}" if without_effect else ""
+    )
+    rest += f"; not tried: {'; '.join(left)}" if left else ""
     return [head, *lines, rest + ("; within the reference's error bar" if error <= bar else "")]
 
 

@@ -76,3 +76,27 @@ def test_soft_friction_is_what_is_off(proofroll: Proofroll, tmp_path: Path) -> N
     text = " ".join(out.split())
     lines = text.partition("Options of the file, switched one after the other; worst error of friction.axle ")[2]
     assert re.search(r"hard constraints in place of soft ones: [\d.e-]+ → [\d.]+e-1\d N m", lines)
+
+
+@pytest.mark.nightly
+def test_euler_with_explicit_damping_is_what_is_off(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Steps that are coarse for a joint's damping are told as Euler's, not as damping that the engine adds.
+
+    Switches that take nothing away stand beside the rest; no other scheme is said to be the engine's own.
+    """
+    path = tmp_path / "reacher.xml"
+    option = "<option timestep='0.005' iterations='3'><flag eulerdamp='disable'/></option>"
+    links = [
+        f"<body pos='{at} 0 0'><joint axis='0 0 1' damping='0.01'/>"
+        f"<geom type='capsule' fromto='0 0 0 {end} 0 0' size='0.01'/>"
+        for at, end in ((0.0, 0.12), (0.12, 0.1))
+    ]
+    path.write_text(f"<mujoco>{option}<worldbody>{''.join(links)}</body></body></worldbody></mujoco>")
+    words = ("--until", "1", "--out", str(tmp_path / "out"))
+    text = " ".join(proofroll("compare", str(path), *words)[1].split())
+    assert "is wrong at this step: " in text
+    assert "damped at a rate" not in text
+    lines, _, rest = text.partition("switched one after the other; ")[2].partition("rest: ")
+    assert "RK4 in place of Euler: " in lines
+    assert "hard constraints" not in lines
+    assert "no less by: MuJoCo's default solver in place of 3 iterations; hard constraints in place of" in rest

@@ -25,9 +25,8 @@ from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.stability.axes import Axis, AxisTerm, Effort, chosen, evenly_chosen
-from proofroll.studies.stability.axis_values import axis_values
 from proofroll.studies.stability.claims import Claim, file_for
-from proofroll.studies.stability.map import _refused, stability
+from proofroll.studies.stability.map import _refused, axis_values, stability
 from proofroll.studies.stability.records import Boundary, BoundaryPoint, StabilityStudy, dependence
 from proofroll.studies.stability.step_numbers import OSCILLATION, explanation, values
 from proofroll.studies.stability.study import stability_study, with_programs

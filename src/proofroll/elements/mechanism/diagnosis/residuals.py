@@ -213,6 +213,7 @@ def _by_scheme(residuals: Residuals[Change], change: Change | None) -> bool:
     mechanism = change.mechanism
     damping = np.array([joint.damping for joint in mechanism.joints for _ in range(joint.nv)])
     added = (change.damping - 1.0) * damping + change.added_damping
+    added = np.append(added, change.decay)
     if np.any(added < 0) or not np.any(added > 0):
         return False
     least = np.maximum(residuals.scheme, residuals.closes * residuals.before)
