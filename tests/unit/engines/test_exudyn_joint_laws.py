@@ -1,5 +1,7 @@
 """Dry friction and stops of joints in Exudyn's redundant coordinates, by its own law along a coordinate."""
 
+from dataclasses import replace
+
 import mechanism_runs as runs
 import numpy as np
 import pytest
@@ -72,6 +74,19 @@ def test_friction_slows_a_mass_and_holds_it():
     run.advance(1.0)
     assert run.sample().p_WB[0, 2] == pytest.approx(0.125, abs=2e-3)
     assert abs(run.sample().v_WB[0, 2]) < 1e-6
+
+
+@pytest.mark.one_in(3)
+@pytest.mark.parametrize("dt", [1e-3, 1e-4, 1e-5])
+def test_a_wheel_that_nothing_else_drives_comes_to_rest(dt):
+    """At any step Newton's method ends where bristles make forces of the round-off of the wheel's angle."""
+    wheel = Body("wheel", 1.0, inertia=(2e-3, 2e-3, 2e-3))
+    axle = Joint("axle", "revolute", "world", "wheel", v0=(2.0,), friction=0.1, damping=0.5)
+    matched = load_engine("exudyn").presets["redundant"]["matched"]
+    mechanism = Mechanism((wheel,), (axle,), gravity=(0.0, 0.0, 0.0))
+    run = load_engine("exudyn").build(mechanism, replace(matched, dt=dt))
+    run.advance(0.03)
+    assert abs(run.sample().w_WB[0, 2]) < 1e-6
 
 
 def test_a_hinge_rubs_beyond_a_turn():

@@ -53,6 +53,15 @@ def test_the_first_body_may_be_the_world() -> None:
     np.testing.assert_allclose(one.sample().contact_force, -other.sample().contact_force, atol=1e-5)
 
 
+def test_a_wheel_that_creeps_by_less_than_a_float_squares_rests() -> None:
+    """Dry friction takes no impulse of a speed of which no unit can be made; the wheel stays."""
+    wheel = Body("wheel", 1.0, inertia=(2e-3, 2e-3, 2e-3))
+    axle = Joint("axle", "revolute", "world", "wheel", v0=(1e-320,), friction=0.1)
+    run = PINOCCHIO.build(Mechanism((wheel,), (axle,), gravity=(0.0, 0.0, 0.0)), PRESETS["matched"])
+    run.advance(0.01)
+    assert abs(run.sample().w_WB[0, 2]) < 1e-100
+
+
 def test_pgs_is_refused_where_it_returns_wrong_impulses() -> None:
     """A rod's foot gives way much more in one direction than across it; a ball's in all alike, where PGS is right."""
     pgs = replace(PRESETS["matched"], solver="pgs")

@@ -21,6 +21,8 @@ _OF_A_RUN = (
     "timeIntegration.numberOfSteps",
     "timeIntegration.verbose",
 )
+# Round-off of a coordinate of a turn or a metre, which a bristle makes a force of [rad, m].
+_ROUNDED = 16 * np.finfo(np.float64).eps
 
 
 def new_system() -> tuple[Any, Any]:
@@ -44,12 +46,15 @@ class ExudynModel:
         self.integration.advance(t)
 
 
-def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, mass: float = 1.0) -> Any:
+def simulation_settings(
+    settings: ExudynSettings, *, dependent: bool = False, mass: float = 1.0, stiffness: float = 0.0
+) -> Any:
     """Settings in Exudyn's own structure: no files, one thread, a step that only ``halvings`` may shorten.
 
     ``dependent``: constraints may depend on each other, so the linear solver must handle a singular matrix.
     ``mass``: of all that moves [kg]; Newton's absolute tolerance is a force [N], and round-off of the forces grows with
     what they move.
+    ``stiffness``: of the stiffest bristle or stop [N/m, N m/rad], which makes forces of the round-off of coordinates.
     """
     kind = getattr(exu.DynamicSolverType, settings.integrator.upper()) if settings.integrator in EXPLICIT else None
     result = new_settings(dependent=dependent, explicit=kind)
@@ -61,7 +66,7 @@ def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, ma
     if settings.halvings:
         time.minimumStepSize = settings.dt / 2**settings.halvings
     time.newton.relativeTolerance = settings.newton_tolerance
-    time.newton.absoluteTolerance = settings.newton_tolerance / 100 * max(1.0, mass)
+    time.newton.absoluteTolerance = settings.newton_tolerance / 100 * max(1.0, mass) + _ROUNDED * stiffness
     time.newton.useModifiedNewton = True  # off by default in 1.11, which explains every difference from 1.13
     time.newton.modifiedNewtonJacUpdatePerStep = settings.jacobian == "step"
     alpha = time.generalizedAlpha
@@ -92,24 +97,25 @@ class Integration:
         *,
         dependent: bool = False,
         mass: float = 1.0,
+        stiffness: float = 0.0,
         moved: Callable[[float], Mapping[Any, float]] | None = None,
     ) -> None:
         """Initialises the solver in the initial configuration of an assembled system, at the time ``at`` [s].
 
         For ``turning`` and ``moved`` (at a time) see :func:`consistent_start`; without them, Exudyn finds the start
-        itself. For ``dependent`` and ``mass`` see :func:`simulation_settings`.
+        itself. For ``dependent``, ``mass`` and ``stiffness`` see :func:`simulation_settings`.
 
         Raises:
             Refused: the engine does not accept the model.
         """
         self.t = at
         self._again: Callable[[float], Integration] = lambda t: Integration(
-            system, settings, at=t, dependent=dependent, mass=mass, moved=moved
+            system, settings, at=t, dependent=dependent, mass=mass, stiffness=stiffness, moved=moved
         )
         self.dt = settings.dt
         self._cure = "use a smaller dt" + " or a larger friction_zone" * (settings.friction_zone is not None)
         self.system = system
-        self.options = simulation_settings(settings, dependent=dependent, mass=mass)
+        self.options = simulation_settings(settings, dependent=dependent, mass=mass, stiffness=stiffness)
         self.options.timeIntegration.startTime, self.options.timeIntegration.endTime = at, at + settings.dt
         explicit = settings.integrator in EXPLICIT
         pushed = moved(at) if moved else {}
@@ -248,7 +254,9 @@ def own_lines(settings: ExudynSettings) -> list[str]:
     steps = f"round(simulationSettings.timeIntegration.endTime / {settings.dt!r})"
     lines.append(f"simulationSettings.timeIntegration.numberOfSteps = {steps}")
     if settings.integrator not in EXPLICIT:
-        lines.append("# newton.absoluteTolerance: as many times that as kilograms move, of more than 1 kg")
+        lines.append(
+            "# newton.absoluteTolerance: times the moving kilograms, if above 1; more for friction and stops of joints"
+        )
     if settings.stiffness is not None:
         lines.append(f"# contact: stiffness {settings.stiffness:g} N/m, friction zone {settings.friction_zone:g} m/s")
     return lines

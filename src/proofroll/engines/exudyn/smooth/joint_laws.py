@@ -42,13 +42,14 @@ class JointLaw(NamedTuple):
 
 
 class JointLaws:
-    """The laws of a mechanism, added to a system."""
+    """The laws of a mechanism, added to a system; ``stiffness``: of the stiffest bristle or stop [N/m, N m/rad]."""
 
     def __init__(self, system: Any, mechanism: Mechanism, coordinate: Callable[[Joint], Any], dt: float) -> None:
         """``coordinate`` makes Exudyn's marker of a joint's coordinate; ``dt`` is the step [s]."""
         self._system, self._mechanism, self._new_coordinate, self._dt = system, mechanism, coordinate, dt
         self._coordinates: dict[str, Any] = {}
         self._ground: Any = None
+        self.stiffness = 0.0
         self._laws: list[JointLaw] = []
         held = any(joint.friction or joint.limits for joint in mechanism.joints)
         inertias = np.diag(matrices_of(mechanism).mass_matrix) if held else np.zeros(mechanism.nv)
@@ -96,6 +97,7 @@ class JointLaws:
         the start; a bristle at rest has 1.
         """
         law = dict[str, Any]()
+        self.stiffness = max(self.stiffness, inertia / self._dt**2)
         if joint.friction:
             law["dynamicFrictionForce"] = joint.friction
             law["stickingStiffness"], law["stickingDamping"] = inertia / self._dt**2, 2 * inertia / self._dt

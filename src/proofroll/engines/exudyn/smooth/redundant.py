@@ -79,8 +79,9 @@ class Redundant(ExudynModel):
         self._rank = row_rank(self._rows)
         dependent = row_rank(rows) < len(rows)
         turning = self._turning()
+        sizes = {"mass": mechanism.mass, "stiffness": self._laws.stiffness}
         self.integration = Integration(
-            self.system, settings, turning, dependent=dependent, mass=mechanism.mass, moved=self._laws.accelerations
+            self.system, settings, turning, dependent=dependent, moved=self._laws.accelerations, **sizes
         )
 
     def drive(self, values: Array) -> None:

@@ -43,6 +43,7 @@ _CLOSED = 0.5
 _NEAR = 2.0
 # Part of the largest speed of a row that a speed along a normal has to be, to count.
 _SMALL = 1e-9
+_AT_REST = 1e-100  # speed of which no unit is made: quotients by it leave the range of floats [m/s, rad/s]
 # Ratio of friction to its bound above which an impulse lies on the cone.
 _INSIDE = 1 - 1e-6
 _NO_CHANGE: Sequence[float] = (0.0, 0.0, 0.0)  # of slip and gap velocities
@@ -456,7 +457,7 @@ class ImpulseSteps:
         # units of speed and impulse the problem is the same for all masses, steps and lengths.
         speeds, mobility = [abs(speed) for speed in g.tolist()], G.diagonal().tolist()
         fastest = max(speeds)
-        speed = max(*(speeds[end - 1] for end in solver.ends), _SMALL * fastest) or 1.0
+        speed = max(*(speeds[end - 1] for end in solver.ends), _SMALL * fastest) if fastest > _AT_REST else 1.0
         unit = speed / max(mobility)
         points = []
         for row, (end, k) in enumerate(zip(solver.ends, which, strict=True)):
