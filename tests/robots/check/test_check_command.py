@@ -24,6 +24,23 @@ pytestmark = pytest.mark.drill  # each imports an engine, or the first of them d
 Install = Callable[[Mapping[str, str]], None]
 
 
+def test_what_our_feed_leaves_out_is_no_fault_of_the_engine(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Of an engine without an importer a cause is told of our feed: another mark, no remedy, no exit 1.
+
+    Elements of one name are counted.
+    """
+    path = tmp_path / "robot.urdf"
+    text = urdf(first='<dynamics friction="0.7"/>')
+    path.write_text(text.replace("</robot>", "<gazebo/><gazebo/><transmission/></robot>"))
+    code, out, _ = proofroll("check", str(path), "--engine", "exudyn")
+    said = " ".join(out.split())
+    assert code == 0
+    assert re.search(r"Exudyn [\d.]+ ◐ ", said)
+    assert ", as we feed it, differs in forward dynamics by " in said
+    assert "Do: " not in said
+    assert "note: 2 × gazebo, transmission: options for one program" in said
+
+
 def test_json(proofroll: Proofroll, arm: Path) -> None:
     """The JSON has the file, its kind and findings, and for every engine version, layers and causes."""
     names = ("mujoco", "pinocchio", "exudyn")

@@ -15,7 +15,7 @@ from proofroll.robots.check.records import AgainstCheck, HeldLayer, ImporterRow,
 from proofroll.robots.files.robot_file import LintRemark
 
 WIDTH = 80
-_MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": SYMBOLS["refused"], "missing": " "}
+_MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": SYMBOLS["refused"], "missing": " ", "fed": "◐"}
 _COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": "magenta"}
 
 
@@ -39,7 +39,8 @@ def table(content: RobotCheck) -> Table:
         name = engine_title(row.engine.partition("@")[0] if "/" in row.engine else row.engine)
         label = Text(one_line(f"{name} {row.version or ''}"), overflow="ellipsis")
         cells = (_cell(row.layers.get(layer)) for layer in content.layers)
-        rows.add_row(label, Text(_MARKS.get(row.status, "!"), style=style), *cells)
+        mark = _MARKS["fed"] if row.fed and row.status == "explained" else _MARKS.get(row.status, "!")
+        rows.add_row(label, Text(mark, style=style), *cells)
     return rows
 
 
@@ -69,7 +70,10 @@ def remark_lines(remarks: Sequence[LintRemark]) -> Iterator[str]:
     places: dict[tuple[str, str], list[str]] = {}
     for remark in remarks:
         places.setdefault((remark.level, remark.what), []).append(remark.where)
-    for (level, what), spots in places.items():
+    for (level, what), found in places.items():
+        spots = [
+            where if found.count(where) == 1 else f"{found.count(where)} × {where}" for where in dict.fromkeys(found)
+        ]
         more = f" and {len(spots) - 2} more" if len(spots) > 3 else ""
         yield from wrapped(f"{level}: {', '.join(spots[: 2 if more else 3])}{more}: {what}")
 
@@ -135,10 +139,10 @@ def sentences(row: ImporterRow) -> Iterator[str]:
     if row.message:
         yield f"{name} {_VERBS.get(row.status, row.status)}: {row.message}"
     for cause in row.causes:
-        advice = f" Do: {cause.remedy}." if cause.remedy else ""
+        advice = f" Do: {cause.remedy}." if cause.remedy and not row.fed else ""
         yield (
-            f"{name} differs in {cause.layer} by {amount(cause.before)}; explained by: {cause.name}; "
-            f"with that hypothesis {amount(cause.after)}.{advice}"
+            f"{name}{', as we feed it,' if row.fed else ''} differs in {cause.layer} by {amount(cause.before)}; "
+            f"explained by: {cause.name}; with that hypothesis {amount(cause.after)}.{advice}"
         )
     if row.where:
         yield f"{name}: most at {row.where}."

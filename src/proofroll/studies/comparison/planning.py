@@ -355,7 +355,10 @@ def _rungs(
     asked: list[tuple[int, float, EngineFacts]] = []
     for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
-            asked += [(index, factor, facts) for factor in row.ladder if factor != 1 and _asked(facts, factor)]
+            given = facts.settings[facts.resolution]
+            most = 1.0 if facts.resolution == "rtol" else np.inf  # an rtol of 1 or more would ask for nothing
+            factors = [factor for factor in row.ladder if factor != 1 and given * _scaled(facts, factor) < most]
+            asked += [(index, factor, facts) for factor in factors]
     scaled = [
         (facts.name, {**facts.settings, facts.resolution: facts.settings[facts.resolution] * _scaled(facts, factor)})
         for _, factor, facts in asked
@@ -366,11 +369,6 @@ def _rungs(
         if isinstance(scaled_facts, EngineFacts):
             ladders[index][factor] = scaled_facts
     return ladders
-
-
-def _asked(facts: EngineFacts, factor: float) -> bool:
-    """True if a rung makes sense: a relative tolerance of 1 or more would ask for nothing."""
-    return facts.resolution != "rtol" or facts.settings["rtol"] * _scaled(facts, factor) < 1
 
 
 def _scaled(facts: EngineFacts, factor: float) -> float:

@@ -244,7 +244,9 @@ class Commands:
             InputError: the policy fails.
         """
         control = self._control
-        tables = [float(value_at(table, _on(t, table.times))) for table in self.tables]
+        # a time of a table is the given one but for round-off
+        on = [next((time for time in table.times if same_instant(t, time)), t) for table in self.tables]
+        tables = [float(value_at(table, at)) for table, at in zip(self.tables, on, strict=True)]
         if control is None:
             return np.array(tables)
         if same_instant(t, control.instant(self._next)):
@@ -305,8 +307,3 @@ class Commands:
             gravity_B=R.T @ self._down,
             last=self._last.copy(),
         )
-
-
-def _on(t: float, times: Sequence[float]) -> float:
-    """The time of a table that is the given one but for round-off, else the time itself [s]."""
-    return next((time for time in times if same_instant(t, time)), t)

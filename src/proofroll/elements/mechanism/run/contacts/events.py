@@ -76,6 +76,7 @@ _CLOSED = 1e-6
 _ROUNDED = 1.01
 # Cosine between the slips of two samples below which one line of slip has turned: the line may turn with its bodies.
 _REVERSED = -0.9
+_HOPS = (EventKind.IMPACT, EventKind.LIFT_OFF)  # within an engine's steps and in no sample, a contact hops
 # Kinds of events that samples cannot distinguish from others: a resting contact may still begin to move, and a settling
 # one may go on rebounding.
 _ALIKE: Mapping[str, str] = {EventKind.REST: EventKind.STICK, EventKind.SETTLE: EventKind.IMPACT}
@@ -163,7 +164,9 @@ class ContactWatch:
                 else:
                     left.remove(event)
                     ordered.append((event.time, place[id(event)], _as_seen(event, sighting)))
-            ordered += [(event.time, place[id(event)], event) for event in left if told and not _hops(event)]
+            for event in left if told else ():
+                if not (isinstance(event, StepEvent) and event.kind in _HOPS):
+                    ordered.append((event.time, place[id(event)], event))
         return [event for *_, event in sorted(ordered, key=lambda item: item[:2])]
 
     def _events(
@@ -201,7 +204,9 @@ class ContactWatch:
                     doubt += abs(time - moment)
                     bracket = max(time - doubt, low), min(time + doubt, high)
                     event = Event(kind, time, *bracket, contact.name)
-                    since = float(times[_rises_since(followed.slip[:, c], k)]) if kind == EventKind.SLIP else low
+                    slip = followed.slip[:, c]  # one that grazes first creeps
+                    rises_from = next((j for j in range(k, 0, -1) if slip[j - 1] >= slip[j]), 0)
+                    since = float(times[rises_from]) if kind == EventKind.SLIP else low
                     events.append(Sighting(event, since, low, high))
         return sorted(events, key=lambda sighting: sighting.event.time)
 
@@ -244,11 +249,6 @@ def _told_slips(times: FloatArray, located: Sequence[Event]) -> FloatArray:
     return states
 
 
-def _rises_since(slip: FloatArray, k: int) -> int:
-    """Number of the sample from which a slip speed rises up to sample k: one that grazes first creeps."""
-    return next((j for j in range(k, 0, -1) if slip[j - 1] >= slip[j]), 0)
-
-
 def _alike(located: Event, sighting: Sighting) -> bool:
     """True if an event may be the one seen in the samples: same contact and kind, at most one interval off."""
     seen, wide = sighting.event, sighting.high - sighting.low
@@ -265,11 +265,6 @@ def _as_seen(located: Event, sighting: Sighting) -> Event:
     if not isinstance(located, StepEvent):
         return located
     return replace(sighting.event, time=located.time, time_low=located.time_low, time_high=located.time_high)
-
-
-def _hops(event: Event) -> bool:
-    """True if it is a contact that parts or closes within an engine's steps and in no sample: it may hop."""
-    return isinstance(event, StepEvent) and event.kind in {EventKind.IMPACT, EventKind.LIFT_OFF}
 
 
 def _without_lone(states: _States) -> _States:
