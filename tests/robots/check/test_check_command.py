@@ -77,7 +77,7 @@ def test_a_difference(proofroll: Proofroll, tmp_path: Path) -> None:
     assert cause["after"] < 1e-10
 
 
-@pytest.mark.parametrize("law", ["", 'solreffriction="0.05 1" solimpfriction="0.6 0.8 0.001 0.5 2"'])
+@pytest.mark.parametrize("law", ["", 'damping="2"', 'solreffriction="0.05 1" solimpfriction="0.6 0.8 0.001 0.5 2"'])
 def test_softness_of_dry_friction(proofroll: Proofroll, tmp_path: Path, law: str) -> None:
     """MuJoCo holds an MJCF with dry friction, and the creep that is told is that of its own run under a load."""
     mujoco = pytest.importorskip("mujoco")

@@ -191,8 +191,9 @@ def _softness_of_friction(model: Any, data: Any) -> tuple[str, ...]:
     """Remark on the softness of dry friction in the file's own rows, which are hard from then on."""
     mujoco.mj_forward(model, data)
     rows = np.flatnonzero(data.efc_type[: data.nefc] == int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
-    # The row resists with (damping · speed) / R until it reaches its friction.
-    speeds = data.efc_R[rows] * data.efc_frictionloss[rows] / data.efc_KBIP[rows, 1]
+    # The row resists with (damping · speed) / R until it reaches its friction, and the joint's own damping beside it.
+    dampings = model.dof_damping[data.efc_id[rows]]
+    speeds = data.efc_frictionloss[rows] / (data.efc_KBIP[rows, 1] / data.efc_R[rows] + dampings)
     model.dof_solref[:], model.dof_solimp[:, :2] = (-1.0, -1e9), mujoco.mjMAXIMP
     model.opt.solver, model.opt.iterations, model.opt.tolerance = int(mujoco.mjtSolver.mjSOL_NEWTON), 100, 0.0
     if not rows.size:
