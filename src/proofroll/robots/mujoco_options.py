@@ -73,7 +73,7 @@ def own_options(path: Path) -> OwnOptions | None:
         switches[f"MuJoCo's default solver in place of {', '.join(of_rows)}"] = usual_solver
     euler = integrator == "Euler"  # the only one that the flag is for
     explicit = euler and bool(option.disableflags & bits.mjDSBL_EULERDAMP)
-    if euler and not explicit:
+    if euler and not explicit and any(np.any(joint.damping) for joint in spec.joints):
         switches["damping as armature in place of implicit"] = {"damping_armature": "true"}
     if integrator != "RK4":
         switches[f"RK4 in place of {integrator}"] = _RK4

@@ -61,6 +61,8 @@ def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
     while left and error > bar and runs + len(left) <= _MOST:
         cases = _cases(run, spec.name, {words: {**options, **changes} for words, changes in left.items()}, runner)
         results = runner.run(cases.values(), budget=budget)
+        # without those that mean nothing beside what was switched
+        left = {words: left[words] for words in cases if results[cases[words].key].status is not Status.REFUSED}
         runs += sum(result.status is not Status.LEFT_OUT for result in results.values())
         errors = {
             words: _errors(reference, [quantity], case, runner)[quantity][0]
@@ -77,10 +79,9 @@ def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
         without_effect.append(words)
     head = f"Options of the file, switched one after the other; worst error of {quantity} ({runs} runs):"
     lines = [f"  {words}: {number(before, 2)} → {number(after, 2)}{unit}" for words, before, after in steps]
-    rest = f"  rest: {number(error, 2)}{unit}" + (
-        f"; no less by: {'; '.join(without_effect)}" if without_effect else ""
-    )
-    rest += f"; not tried: {'; '.join(left)}" if left else ""
+    rest = f"  rest: {number(error, 2)}{unit}"
+    for says, switches in (("no less by", without_effect), ("not tried", left)):
+        rest += f"; {says}: {'; '.join(switches)}" if switches else ""
     return [head, *lines, rest + ("; within the reference's error bar" if error <= bar else "")]
 
 

@@ -99,4 +99,5 @@ def test_euler_with_explicit_damping_is_what_is_off(proofroll: Proofroll, tmp_pa
     lines, _, rest = text.partition("switched one after the other; ")[2].partition("rest: ")
     assert "RK4 in place of Euler: " in lines
     assert "hard constraints" not in lines
+    assert "as armature" not in rest
     assert "no less by: MuJoCo's default solver in place of 3 iterations; hard constraints in place of" in rest
