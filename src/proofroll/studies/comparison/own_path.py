@@ -23,7 +23,7 @@ from proofroll.studies.judging import run_values
 from proofroll.studies.judging.reference import Reference
 
 _MOST, _SECONDS = 20, 15.0  # runs, and processor time of them [s]
-_LESS = 0.99  # of an error that a switch at the end must leave at most, to be a step of its own
+_LESS = 0.99  # part of an error that the last switch leaves at most; one that changes no more than the rest has no line
 _JUDGED = {Verdict.AGREES, Verdict.DIFFERS, Verdict.CONVERGES, Verdict.UNCONFIRMED}
 
 
@@ -44,9 +44,8 @@ def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
     if run is None or own_options is None or run.case is None or run.facts is None or run.verdict not in _JUDGED:
         return []
     reference = outcome.points[point_name(run.parameters)].reference
-    if reference is None:
-        return []
-    if not own_options.of_contacts.keys() <= run.facts.settings.keys() and run.verdict is not Verdict.DIFFERS:
+    of_contacts = own_options.of_contacts.keys() <= run.facts.settings.keys()
+    if reference is None or not (of_contacts or run.verdict is Verdict.DIFFERS):
         return []
     left = {words: made for words, made in own_options.switches.items() if made.keys() <= run.facts.settings.keys()}
     off = _off(reference, run, runner)
@@ -77,8 +76,10 @@ def own_path(outcome: Outcome, runner: Runner, spent: float) -> list[str]:
     while steps and steps[-1][2] > _LESS * steps[-1][1]:
         words, error, _ = steps.pop()
         without_effect.append(words)
+    without_effect += [words for words, before, after in steps if abs(after / before - 1) < 1 - _LESS]
     head = f"Options of the file, switched one after the other; worst error of {quantity} ({runs} runs):"
-    lines = [f"  {words}: {number(before, 2)} → {number(after, 2)}{unit}" for words, before, after in steps]
+    told = [item for item in steps if item[0] not in without_effect]
+    lines = [f"  {words}: {number(before, 2)} → {number(after, 2)}{unit}" for words, before, after in told]
     rest = f"  rest: {number(error, 2)}{unit}"
     for says, switches in (("no less by", without_effect), ("not tried", left)):
         rest += f"; {says}: {'; '.join(switches)}" if switches else ""
