@@ -13,7 +13,7 @@ from robot_gallery import locate
 from robot_templates import inertial, mjcf, spherical, urdf
 from typer.testing import CliRunner
 
-from proofroll import load_scene, simulate
+from proofroll import judge, load_scene, simulate
 from proofroll.cli import app
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.events import events_of
@@ -389,3 +389,23 @@ def test_a_random_start_lies_in_the_ranges_of_the_file(tmp_path: Path) -> None:
         tables = RobotScenes.tables(path, values | {"limits": 1})
         starts = {joint["name"]: (joint["limits"], joint["q0"][0]) for joint in tables["joints"]}
         assert all(ends[0] <= q <= ends[1] for ends, q in starts.values()), starts
+
+
+@pytest.mark.drill
+def test_a_record_of_a_robot_begins_where_its_first_row_says(arm: Path) -> None:
+    """A file gives no start: the truth begins as the first row that has one, else at random, with a sentence on which.
+
+    A later clock, or a rate that lacks, gives no start; a run of proofroll's keeps its own.
+    """
+    run = simulate(load_scene(str(arm), seed=3), until=0.2, every=0.02)
+    names = [str(name) for name in run.data_vars if str(name)[:2] in {"q.", "v."}]
+    record = {"time": run["time"].to_numpy()} | {name: run[name].to_numpy() for name in names}
+    judged = judge(record, str(arm))
+    assert judged.agrees
+    assert judged.quiet == "the file gives no start: the truth begins as the first row"
+    (rate, *_) = [name for name in names if name.startswith("v.")]
+    for changed in ({**record, "time": record["time"] + 0.5}, {k: v for k, v in record.items() if k != rate}):
+        at_random = judge(changed, str(arm))
+        assert not at_random.agrees
+        assert at_random.quiet.startswith("the file gives no start, so a random one was taken; of an open tree")
+    assert not judge(run, load_scene(str(arm), seed=3)).quiet

@@ -3,8 +3,6 @@
 No adapter calls a policy, and no signal changes within a step. A target belongs to the steps that begin at its instant.
 """
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

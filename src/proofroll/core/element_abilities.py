@@ -177,6 +177,18 @@ class HoldsTargets(Protocol):
 
 
 @runtime_checkable
+class BeginsAnywhere(Protocol):
+    """Ability of an element that may begin with other coordinates and rates than its scene's."""
+
+    def begun(self, values: Mapping[str, float]) -> Element | None:
+        """The element that begins with these values; None: they are not all of its start, or it cannot begin so.
+
+        Args:
+            values: variables of the first row of a run, by name, in the truth's units.
+        """
+
+
+@runtime_checkable
 class KnowsAnotherScene(Protocol):
     """Ability of an element that can tell when an engine built a different kind of model with admissible numbers."""
 

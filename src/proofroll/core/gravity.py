@@ -1,7 +1,5 @@
 """Gravity, which all elements of a scene share."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

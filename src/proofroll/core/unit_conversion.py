@@ -1,7 +1,5 @@
 """Units of other programs, and the factors that convert their numbers to SI."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Runs that are kept by name, under ``out/runs``."""
 
-from __future__ import annotations
-
 import json
 import re
 import time

@@ -1,7 +1,5 @@
 """Machines on which a runner's cases run: a plug-in, found by the entry point ``proofroll.clusters``."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar, cast

@@ -1,7 +1,5 @@
 """Processor time of a study: its limit, beyond which cases are left out, and what it was spent on."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import Counter, defaultdict

@@ -1,7 +1,5 @@
 """Formulations and presets of engines as studies over steps and tolerances take them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Options of a person's own Exudyn program, read without running it."""
 
-from __future__ import annotations
-
 import ast
 import math
 import operator

@@ -1,7 +1,5 @@
 """Sentences of an answer's records, the same on the page, on the terminal and in JSON."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

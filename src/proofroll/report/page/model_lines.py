@@ -1,7 +1,5 @@
 """Lines for a reader's own model: what makes a setting there, what checks it, and what keeps it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Verdicts of a comparison in one look: a dot for each setting on an axis of its error over what is allowed."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A comparison on the terminal: the answer, a line for each setting, and a short closing, within 80 columns."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Iterator, Sequence

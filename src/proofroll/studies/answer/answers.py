@@ -1,7 +1,5 @@
 """Makes and stores answers: the search of all engines for a tolerance in a scene, and the speeds of what it found."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

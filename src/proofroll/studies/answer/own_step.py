@@ -1,7 +1,5 @@
 """Answer for a person's own step: whether it is good enough for a tolerance, and which one would do."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The search of an engine over all its settings and steps, and the searches of several engines side by side."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Callable, Generator, Mapping, Sequence

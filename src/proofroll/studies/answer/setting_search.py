@@ -1,7 +1,5 @@
 """The search along one setting of an engine: which step to run next, until it is decided whether one may be advised."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Parts of an error by the options of a person's own file, each switched where that takes most of the error away."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

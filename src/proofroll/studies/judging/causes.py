@@ -1,7 +1,5 @@
 """Typical mistakes in a given trajectory, each named only if it closes the difference from the truth."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Reads the files with a question and claims for a stability map: ``study = "stability"``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Analysis of a mechanism's constraints: rank, redundancy, mobility, and determinate reactions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar

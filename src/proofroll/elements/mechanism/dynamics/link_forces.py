@@ -3,8 +3,6 @@
 The harness evaluates them for truth and engines alike, at the motion that each of them has.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

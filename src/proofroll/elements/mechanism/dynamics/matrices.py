@@ -1,7 +1,5 @@
 """Matrices of the equations of motion at the start: M v̇ + h + g = τ in the velocities of the tree."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

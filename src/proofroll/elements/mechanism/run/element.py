@@ -138,6 +138,20 @@ class MechanismElement:
         targets = along(self.mechanism, run)
         return None if targets is None else self if targets is self.mechanism else replace(self, mechanism=targets)
 
+    def begun(self, values: Mapping[str, float]) -> MechanismElement | None:
+        """See :class:`proofroll.core.element_abilities.BeginsAnywhere`; trees of joints with one coordinate each."""
+        mechanism = self.mechanism
+        joints = [joint for joint in mechanism.joints if joint.nv]
+        names = {f"{kind}.{joint.name}" for joint in joints for kind in "qv"}
+        bound = mechanism.loops or mechanism.couplings or any(joint.motion or joint.nv > 1 for joint in joints)
+        if bound or not names <= values.keys():
+            return None
+        begun = [
+            replace(item, q0=(values[f"q.{item.name}"],), v0=(values[f"v.{item.name}"],)) if item.nv else item
+            for item in mechanism.joints
+        ]
+        return replace(self, mechanism=replace(mechanism, joints=tuple(begun)))
+
     @cached_property
     def start(self) -> Placed:
         """Motion of the mechanism at time 0."""

@@ -5,8 +5,6 @@ Each block is solved exactly for the impulses of the others: a contact sticks, o
 root of one equation.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from operator import mul

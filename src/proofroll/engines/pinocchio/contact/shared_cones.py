@@ -1,7 +1,5 @@
 """Contacts whose cones sliding and turning share: rows of turning beside those of Pinocchio's point contacts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

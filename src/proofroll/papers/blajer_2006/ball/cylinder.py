@@ -7,8 +7,6 @@ shape (..., 2); array arguments may carry leading dimensions (``...``), e.g. tim
 coordinate, ``e3 = e1 × e2``.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cached_property, lru_cache
 

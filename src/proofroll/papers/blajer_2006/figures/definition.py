@@ -1,7 +1,5 @@
 """Content of a file of figures: runs, figures of them, and an article's statements about them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 

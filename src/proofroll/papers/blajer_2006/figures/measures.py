@@ -1,7 +1,5 @@
 """Measures: single numbers that characterise a curve, to compare sentences of an article with a run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

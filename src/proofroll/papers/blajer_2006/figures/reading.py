@@ -1,7 +1,5 @@
 """Reading of files that define figures (``study = "figures"``)."""
 
-from __future__ import annotations
-
 import re
 from decimal import Decimal, InvalidOperation
 

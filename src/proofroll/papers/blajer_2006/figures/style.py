@@ -1,7 +1,5 @@
 """Style of figures: fonts, labels with units, and lines that differ in colour, in grey and in dashes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 # Colours after Okabe and Ito (2008), distinct for every common kind of colour vision: here from dark to light

@@ -1,7 +1,5 @@
 """Contact reactions as MuJoCo computed them, and the rolling resistance that MuJoCo cannot express."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

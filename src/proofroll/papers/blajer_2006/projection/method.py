@@ -18,8 +18,6 @@ Sources: W. Blajer, Math. Comput. Model. Dyn. Syst. 12(6), 2006, 543-553, sectio
 Blajer, Multibody Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

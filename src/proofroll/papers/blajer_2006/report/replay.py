@@ -1,7 +1,5 @@
 """Replay of balls on surfaces: the wall, the balls, and the contact force."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping
