@@ -13,7 +13,7 @@ from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, CONTINUOUS, impact_samples, off_impacts
 from proofroll.core.diagnosis.scene_diagnosis import diagnose_scene
-from proofroll.core.element_abilities import BeginsAnywhere, MovesFreely, step_bound
+from proofroll.core.element_abilities import MovesFreely, step_bound
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.multi_element import REQUIRED
 from proofroll.core.number_format import be, number, spaced
@@ -28,7 +28,7 @@ from proofroll.studies.judging.asked_tolerance import bounds_of, judged_names
 from proofroll.studies.judging.causes import GivenVariable, begun_later, causes_of
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.judging.run_values import turned_alike
-from proofroll.studies.judging.user_trajectory import GivenRun, RunInput, read_run
+from proofroll.studies.judging.user_trajectory import GivenRun, RunInput, begun, read_run, start_words
 from proofroll.studies.result_table import gauge, html_table
 
 if TYPE_CHECKING:
@@ -193,7 +193,7 @@ def judge(
     scene = load_scene(scene) if isinstance(scene, str) else scene
     user_run = read_run(run, scene, columns)
     dataset = user_run.dataset
-    given_scene, scene = scene, _begun(scene, dataset)
+    given_scene, scene = scene, begun(scene, dataset)
     between = dataset[BETWEEN].to_numpy() if BETWEEN in dataset else np.zeros(0)
     _require_seconds(scene, dataset)
     asked = scene.fully_asked if "q_WB" in {str(name).partition(".")[0] for name in dataset.data_vars} else scene
@@ -240,34 +240,10 @@ def judge(
         because=because,
         unjudged=unjudged,
         ended=reference.ended,
-        quiet="; ".join(filter(None, (_start_words(given_scene, scene, dataset), reference.quiet))),
+        quiet="; ".join(filter(None, (start_words(given_scene, scene, dataset), reference.quiet))),
         step_bound=bound,
         causes=tuple(causes),
     )
-
-
-def _begun(scene: Scene, run: xr.Dataset) -> Scene:
-    """The scene; one of a file that gives no start, with that of the trajectory's first row, if this has all of it."""
-    if not _is_drawn(scene) or "scene_digest" in run.attrs or float(run["time"][0]):
-        return scene
-    values = {str(name): float(item[0]) for name, item in run.data_vars.items() if item.dims == ("time",)}
-    elements = [item.begun(values) if isinstance(item, BeginsAnywhere) else None for item in scene.elements]
-    return replace(scene, elements=tuple(filter(None, elements))) if all(elements) else scene
-
-
-def _is_drawn(scene: Scene) -> bool:
-    """True if the start of the scene is a random one."""
-    return "seed" in scene.parameters and not scene.parameters.get("keyframe")
-
-
-def _start_words(scene: Scene, begun: Scene, run: xr.Dataset) -> str:
-    """Sentence on where the truth of a file that gives no start begins; empty: the file gives one."""
-    if not _is_drawn(scene) or "scene_digest" in run.attrs:
-        return ""
-    if begun is not scene:
-        return "the file gives no start: the truth begins as the first row"
-    giving = "of an open tree of hinges and slides, q.JOINT and v.JOINT of all in a first row at time 0 give one"
-    return f"the file gives no start, so a random one was taken; {giving}"
 
 
 def _require_seconds(scene: Scene, run: xr.Dataset) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN, add_events, columns_of, observe
-from proofroll.core.element_abilities import WatchesRuns
+from proofroll.core.element_abilities import BeginsAnywhere, WatchesRuns
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError, require_known
 from proofroll.core.events import events_of, wrong_bracket
@@ -152,6 +152,32 @@ def read_run(run: RunInput, scene: Scene, columns: Mapping[str, str] | None = No
         reactions=kept,
         twice=_twice(dataset, scene, completed),
     )
+
+
+def begun(scene: Scene, run: xr.Dataset) -> Scene:
+    """The scene; one of a file that gives no start, with that of the trajectory's first row, if this has all of it."""
+    if not _is_drawn(scene) or "scene_digest" in run.attrs or float(run["time"][0]):
+        return scene
+    variables = {str(name): item for name, item in run.isel(time=0).data_vars.items() if not item.dims}
+    values = {name: float(item) for name, item in variables.items() if name.startswith(("q.", "v."))}
+    values = {name: value for name, value in values.items() if np.isfinite(value)}
+    elements = [item.begun(values) if isinstance(item, BeginsAnywhere) else None for item in scene.elements]
+    return replace(scene, elements=tuple(filter(None, elements))) if all(elements) else scene
+
+
+def _is_drawn(scene: Scene) -> bool:
+    """True if the start of the scene is a random one."""
+    return "seed" in scene.parameters and not scene.parameters.get("keyframe")
+
+
+def start_words(scene: Scene, judged: Scene, run: xr.Dataset) -> str:
+    """Sentence on where the truth of a file that gives no start begins; empty: the file gives one."""
+    if not _is_drawn(scene) or "scene_digest" in run.attrs:
+        return ""
+    if judged is not scene:
+        return "the file gives no start: the truth begins as the first row"
+    giving = "of an open tree of hinges and slides, q.JOINT and v.JOINT of all in a first row at time 0 give one"
+    return f"the file gives no start, so a random one was taken; {giving}"
 
 
 def _whole(run: xr.Dataset, scene: Scene) -> bool:
