@@ -52,7 +52,7 @@ def test_a_whole_file_is_read(tmp_path: Path) -> None:
     controller = read_controller(_written(tmp_path, FULL))
     controller.require_joints(JOINTS, KINDS)
     assert controller.period == 0.02
-    assert controller.driven(JOINTS) == ("L_HIP", "R_HIP", "L_KNEE", "R_KNEE")
+    assert controller.order == ("L_HIP", "R_HIP", "L_KNEE", "R_KNEE")
     assert controller.poses(JOINTS) == pytest.approx([0.5235987755982988, 0, 0, -1.5707963267948966], rel=1e-15)
     knee, hip = controller.servo("R_KNEE"), controller.servo("L_HIP")
     assert knee is not None

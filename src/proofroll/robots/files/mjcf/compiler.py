@@ -64,14 +64,9 @@ def compile_robot(path: str, original: str | None) -> dict[str, Any]:
     return _defined(Path(path), answer)
 
 
-def expand_robot(path: str) -> dict[str, Any]:
-    """Worker's side of :func:`expand`: the file's text with macros written out."""
-    return _defined(Path(path), lambda reader: {"text": reader.expanded(Path(path))})
-
-
-def find_near_shapes(path: str, asked: dict[str, Any]) -> dict[str, Any]:
-    """Worker's side of :func:`near_shapes`: shapes and pairs as plain data."""
-    return _defined(Path(path), lambda reader: {"near": reader.near_shapes(Path(path), **asked)})
+def ask_reader(path: str, method: str, **asked: Any) -> dict[str, Any]:
+    """Worker's side of :func:`expand` and :func:`near_shapes`: what a method of the reader says of a file."""
+    return _defined(Path(path), lambda reader: {"answer": getattr(reader, method)(Path(path), **asked)})
 
 
 def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
@@ -137,11 +132,11 @@ def near_shapes(
         InputError: the engine that defines MJCF cannot read the copy, or is not installed.
         WorkerDied: the engine crashed or took too long.
     """
-    answer = worker.request(call(find_near_shapes, path=str(copy), asked=dict(asked)), time_limit)
-    if "near" not in answer:
+    answer = worker.request(call(ask_reader, path=str(copy), method="near_shapes", **asked), time_limit)
+    if "answer" not in answer:
         message = answer.get("message") or answer["uncovered"]
         raise InputError("ground", path, f"its shapes cannot be read: {message}; take --ground none")
-    return answer["near"], Compiler(*answer["by"])
+    return answer["answer"], Compiler(*answer["by"])
 
 
 def expand(
@@ -163,10 +158,11 @@ def expand(
         folder = Path(name)
         for part, content in parts.items():
             (folder / part).write_bytes(ElementTree.tostring(content, encoding="utf-8"))
-        answer = worker.request(call(expand_robot, path=str(folder / next(iter(parts)))), time_limit)
-    if "text" not in answer:
+        copy = str(folder / next(iter(parts)))
+        answer = worker.request(call(ask_reader, path=copy, method="expanded"), time_limit)
+    if "answer" not in answer:
         raise InputError("file", path, f"its macros cannot be written out: {answer['message']}")
-    return ElementTree.fromstring(answer["text"]), Compiler(*answer["by"])
+    return ElementTree.fromstring(answer["answer"]), Compiler(*answer["by"])
 
 
 class AnswersQuestions(Protocol):
