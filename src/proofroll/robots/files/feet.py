@@ -139,9 +139,14 @@ def _near_pairs(
     Pairs are by the names of their shapes, of a URDF those with a floor. Without a ``motion`` servos move the robot.
     """
     file, lost = _with_contacts(standing.file)
+    start = standing.start
+    coordinates: dict[str, list[float]] = {name: values[:1].tolist() for name, values in start.angle.items()}
+    for name, matrices in start.rotation.items():
+        turned = to_quaternion(matrices[0]).tolist()
+        coordinates[name] = [*start.position[name][0].tolist(), *turned] if name in start.position else turned
     of_urdf, armature = file.kind == "urdf", {joint.name: joint.armature for joint in standing.robot.moving}
     asked = {
-        "start": _coordinates(standing.start),
+        "start": coordinates,
         "servos": {name: [*gains, armature[name]] for name, gains in standing.servos.items()},
         "base_joint": BASE_JOINT if of_urdf and standing.file.base == "free" else "",
         "floor": of_urdf or ground == ON_A_PLANE,
@@ -385,15 +390,6 @@ def _shape(standing: StandingRobot, row: Mapping[str, Any]) -> _Shape:
         R=R @ np.array(row["rotation"]),
         corners=row["corners"],
     )
-
-
-def _coordinates(start: RobotStates) -> dict[str, list[float]]:
-    """Joint -> coordinates of a start, as :func:`proofroll.robots.importers.mujoco_model.near_shapes` takes them."""
-    rows: dict[str, list[float]] = {name: values[:1].tolist() for name, values in start.angle.items()}
-    for name, matrices in start.rotation.items():
-        turned = to_quaternion(matrices[0]).tolist()
-        rows[name] = [*start.position[name][0].tolist(), *turned] if name in start.position else turned
-    return rows
 
 
 def _with_contacts(file: RobotFile) -> tuple[RobotFile, list[str]]:

@@ -53,7 +53,8 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
             judged.append(_run(run, Result(status_of(run.facts), str(run.facts))))
             continue
         if run.is_reference:
-            judged.append(_run(run, Result(Status.NO_TRUTH, _OWN_STEPS)))
+            own = Result(Status.NO_TRUTH, _OWN_STEPS)
+            judged.append(_run(run, own) if point.result.status == Status.DONE else _without_truth(run, point, own))
             continue
         result = results[run.ladder[1.0].key]
         if result.trajectory is None or result.status != Status.DONE:
