@@ -480,9 +480,5 @@ def _changed(file: RobotFile, robot: Robot, cause: RobotHypothesis) -> Robot | N
     other_robot = next(iter(cause.test(evidence)), None)
     if not isinstance(other_robot, Robot) or other_robot is robot:
         return None
-    return other_robot if _freedoms(other_robot) == _freedoms(robot) else None
-
-
-def _freedoms(robot: Robot) -> list[tuple[str, str]]:
-    """Joints that a record of a robot has columns of, with their kinds."""
-    return [(joint.name, joint.kind) for joint in robot.moving]
+    columns, other_columns = ([(joint.name, joint.kind) for joint in item.moving] for item in (robot, other_robot))
+    return other_robot if columns == other_columns else None

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+OWN_STEPS = "its steps are the reference, which is no judge of itself"  # of the formulation of a reference by steps
 # Samples on each side of an event through which a parabola is laid.
 _SIDE = 3
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import atexit
 import contextlib
 import hashlib
+import itertools
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 from xml.etree import ElementTree
@@ -203,7 +204,9 @@ class Definer:
 
     def _place(self, request: Mapping[str, Any]) -> Path | None:
         """File of the answer, by the content of what is asked about and the times of the files beside it."""
-        files = list(_files_below(self._path.resolve().parent))
+        folders = os.walk(self._path.resolve().parent)
+        below = (os.path.join(root, name) for root, _, names in folders for name in names)
+        files = list(itertools.islice(below, _MOST + 1))
         if len(files) > _MOST:
             return None
         arguments = dict(request["arguments"])
@@ -214,16 +217,6 @@ class Definer:
             return None
         text = json.dumps([request["function"], arguments, stats], sort_keys=True, default=str)
         return _folder() / f"{hashlib.sha256(content + text.encode()).hexdigest()}.json"
-
-
-def _files_below(folder: Path) -> Iterator[str]:
-    """Paths of files below a folder, one more than are looked at at most."""
-    count = 0
-    for root, _, names in os.walk(folder):
-        for name in names:
-            yield os.path.join(root, name)
-            if (count := count + 1) > _MOST:
-                return
 
 
 def _folder() -> Path:
