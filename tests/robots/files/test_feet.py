@@ -88,6 +88,14 @@ def test_a_drop_is_the_height_of_the_lowest_foot(stood: Callable[..., Scene]) ->
         assert _height(stood(robot(z=z), CONTROL + "[start]\ndrop = 0.05\n")) == pytest.approx(0.27, abs=1e-12)
 
 
+def test_a_drop_of_what_does_not_float_is_refused(stood: Callable[..., Scene]) -> None:
+    """A trunk on a slide is where its coordinate says: a drop is one line of advice, and none is needed."""
+    held = robot(z=0.25).replace('<freejoint name="root"/>', '<joint name="up" type="slide" axis="0 0 1"/>')
+    with pytest.raises(InputError, match=r"start\.drop = 0\.05: nothing here floats over a floor"):
+        stood(held, CONTROL + "[start]\ndrop = 0.05\n")
+    assert "moved up" not in stood(held).title
+
+
 def test_excluded_pairs_do_not_touch(stood: Callable[..., Scene]) -> None:
     """What the file excludes, or gives laws of its own, is as the file says."""
     after = (

@@ -53,18 +53,8 @@ if TYPE_CHECKING:
     from proofroll.robots.control.base_frames import BaseFrame
     from proofroll.robots.control.bookkeeping.air import HeldRobot
 
-_NOTHING = Reading(
-    joints=(),
-    dofs=(),
-    mass={},
-    com={},
-    inertia={},
-    position={},
-    rotation={},
-    M=np.empty(0),
-    g=np.empty(0),
-    h=np.empty(0),
-)
+_NONE = np.empty(0)
+_NOTHING = Reading(joints=(), dofs=(), mass={}, com={}, inertia={}, position={}, rotation={}, M=_NONE, g=_NONE, h=_NONE)
 MOST = 2  # causes that act together
 _DURATION = 0.1  # s: what is wrong with the bookkeeping of a controller shows in the air within it
 _GRID, _STEP = 4e-3, 5e-4  # s: sampling of a first look, and its longest step
@@ -149,9 +139,8 @@ class ControlledScenes:
         if not ground or (controller.ground and not isinstance(controller.ground.feet, str)):
             return motion
         element: Any = scene.elements[0]
-        mechanism: Mechanism = element.mechanism
-        placed, standing = placed_of(mechanism, motion), self._standing(path, controller, scene.parameters)[0]
-        states = {joint.name: placed.along(joint)[0] for joint in mechanism.joints}
+        placed, (standing, _) = placed_of(element.mechanism, motion), self._standing(path, controller, scene.parameters)
+        states = {joint.name: placed.along(joint)[0] for joint in placed.mechanism.joints}
         number, names = met_besides(standing, GROUNDS[ground], states) or (0, "")
         return ended_at(motion, max(number, 1), f"{names} touch, a pair that the scene lacks") if names else motion
 
@@ -257,11 +246,15 @@ class ControlledScenes:
         with error_location(str(self._path)):
             touching = ground_tables(standing, ground, asked.feet, asked.friction)
         tables = tables | {"geometries": touching.geometries, "pairs": touching.pairs, "impacts": TOGETHER}
-        way = _way_up(tables, robot, controller.start.drop)
+        drop = controller.start.drop
+        way = _way_up(tables, robot, drop)
+        if way is None and drop is not None:
+            advice = "nothing here floats over a floor, so nothing drops; leave it out, and begin higher by [start] q"
+            raise InputError(f"{self._path}: start.drop", drop, advice)
         up = -robot.gravity / np.linalg.norm(robot.gravity)
-        tables["joints"] = _lifted(tables["joints"], way * up)
+        tables["joints"] = _lifted(tables["joints"], (way or 0.0) * up)
         about = touching.about
-        if abs(way) > _SEEN and controller.start.drop is None:
+        if way is not None and abs(way) > _SEEN and drop is None:
             below = "what it stands on" if about.startswith(NO_FLOOR) else "the floor"
             about += f"; moved up by {1e3 * way:.3g} mm, as its start overlaps {below}"
         others = [clause for clause in tables["omitted"] if clause != CONTACTS]
@@ -306,18 +299,21 @@ def _base(controller: Controller, ground: int) -> str:
     return "free" if controller.start.base is not None or ground else "fixed"
 
 
-def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> float:
-    """Way against gravity to the start of the first body that floats [m], for the height of its lowest shape."""
+def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> float | None:
+    """Way against gravity to the start of the first body that floats [m], for the height of its lowest shape.
+
+    None: none floats over a floor.
+    """
     free = next((joint for joint in robot.moving if joint.kind == JointKind.FREE), None)
     size = float(np.linalg.norm(robot.gravity))
     if free is None or not size:
-        return 0.0
+        return None
     up = -robot.gravity / size
     planes = [row for row in tables["geometries"] if row["kind"] == "plane" and row["body"] == WORLD]
     slopes = {row["name"]: float(np.array(row.get("normal", Z)) @ up) for row in planes}
     floors = {name: slope for name, slope in slopes.items() if slope > _STEEP}
     if not floors:
-        return 0.0
+        return None
     raised = {key: value for key, value in tables.items() if key not in {"gravity", "omitted", "control"}}
     raised["joints"] = _lifted(tables["joints"], _ABOVE * up)
     x, y, z = robot.gravity.tolist()
@@ -332,7 +328,7 @@ def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> floa
         slope = floors.get(ends[contact.pair])
         if slope is not None and contact.body_a in lifted:
             heights.append(touch.gap / slope - _ABOVE)
-    return lift(min(heights), drop) if heights else 0.0
+    return lift(min(heights), drop) if heights else None
 
 
 def _lifted(joints: list[dict[str, Any]], way: Array) -> list[dict[str, Any]]:
