@@ -165,6 +165,7 @@ class Controller:
         yield "start.base_velocity", start.base_velocity, len(start.base_velocity) != _BASE_VELOCITY, advice
         advice = "it is a height above the ground; give [start] base"
         yield "start.drop", start.drop, start.drop is not None and ground is None, advice
+        yield "start.drop", start.drop, start.drop is not None and start.drop < 0, "must be at least 0"
         if ground is not None:
             feet, advice = ground.feet, f'give "{FEET}", or a table of links and radii in m, of one at least'
             wrong = feet != FEET if isinstance(feet, str) else not feet or min(feet.values()) < 0
