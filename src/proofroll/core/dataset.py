@@ -76,6 +76,14 @@ def bar_until(attributes: Mapping[str, Any], time: float) -> float:
     return float(bars[count - 1] if count else attributes.get("error_bar", np.inf))
 
 
+def ended_at(dataset: xr.Dataset, count: int, reason: str) -> xr.Dataset:
+    """A truth that ends behind its first ``count`` samples, with the error bars until then; ``reason``: a clause."""
+    cut, end = dataset.isel(time=slice(count)), float(dataset["time"][count])
+    for item in cut.data_vars.values():
+        item.attrs |= {"error_bar": bar_until(item.attrs, float(cut["time"][-1]))} if BARS in item.attrs else {}
+    return cut.assign_attrs({ENDS: end, ENDED: reason})
+
+
 def end_of_truth(end: float) -> str:
     """Clause on the time [s] from which a truth has no value."""
     return f"the truth ends at t = {end:.6g} s"

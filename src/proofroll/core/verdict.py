@@ -130,11 +130,12 @@ class Allowance:
 
 @dataclass(frozen=True)
 class TrueCurve:
-    """True values of an observable; ``ill_posed``: why no run can answer the question; empty: it is well posed."""
+    """True values of an observable, from a ``source``; ``ill_posed``: why no run can answer the question, or empty."""
 
     values: FloatArray
     error_bar: float
     ill_posed: str = ""
+    source: str = "truth"
 
 
 @dataclass(frozen=True)
@@ -322,12 +323,12 @@ def _reason(
     truth_error_bar, tolerance, unit = true.error_bar, allowance.tolerance, allowance.shown_unit
     shown_error, allowed, bar = *_distinct_texts(error, tolerance), f"{number(truth_error_bar)}{unit}"
     if np.isinf(truth_error_bar):
-        return "not judged: the truth does not determine it here"
+        return f"not judged: the {true.source} does not determine it here"
     if truth_error_bar > tolerance:
         why = f"; ill-posed: {true.ill_posed.removeprefix('ill-posed: ')}" if true.ill_posed else ""
-        return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}{why}"
+        return f"not judged: the {true.source}'s error bar {bar} exceeds the tolerance {allowed}{unit}{why}"
     if verdict == Verdict.NOT_JUDGED:
-        whose = "the truth's error bar"
+        whose = f"the {true.source}'s error bar"
         if own_bar > truth_error_bar:
             bar, whose = f"{number(own_bar)}{unit}", run.bar_of or "known only between two times"
         return f"not judged: error {shown_error}{unit} ± {bar}, {whose}, may be within {allowed}{unit} or beyond"

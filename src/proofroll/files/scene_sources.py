@@ -69,6 +69,15 @@ class SceneSource(Protocol):
         """
 
 
+@runtime_checkable
+class SeesTouches(Protocol):
+    """Ability of a reader whose scenes lack pairs of shapes that it did not see come near each other."""
+
+    @staticmethod
+    def until_met(path: Path, scene: Any, motion: Any) -> Any:
+        """A motion up to its first sample in which shapes press each other that the scene has no pair of."""
+
+
 def command_line(*words: str, **options: object) -> str:
     """Command of proofroll to be pasted: words, options with a value, a list or None, and the root of robot files.
 

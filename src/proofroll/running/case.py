@@ -133,6 +133,11 @@ class EngineFacts:
         """The fixed step [s]; None: it adapts, or there is none."""
         return float(self.settings["dt"]) if self.resolution == "dt" else None
 
+    @property
+    def formulated(self) -> str:
+        """Engine with its formulation, as a setting."""
+        return f"{self.name}[formulation={self.settings.get('formulation')}]"
+
     def on(self, requires: Collection[str]) -> EngineFacts:
         """Facts for a scene with these requirements: its order of convergence and its laws."""
         laws = dict.fromkeys(clause for need, clause in self.families.items() if need in requires)

@@ -71,7 +71,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         besides = (counting, np.array(case.between), list(case.engine.steps))
         spent.on("loading")
         with PACE.limited(case.time_limit * FOR_A_TRUTH, _tell):
-            return _run_truth(scene, times, besides, out, made_with("truth", case.engine.version), spent)
+            return _run_truth(case, scene, times, besides, out, spent)
     kind, settings = engine_and_settings(case)
     versions = made_with(plain_name(case.engine.name), kind.version())
     spent.on("loading")
@@ -162,17 +162,20 @@ def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
 
 
 def _run_truth(
-    scene: Any, times: Any, besides: tuple[Any, Any, Any], out: Path, versions: dict[str, str], spent: _TimeAccounts
+    case: Case, scene: Any, times: Any, besides: tuple[Any, Any, Any], out: Path, spent: _TimeAccounts
 ) -> Result:
     from proofroll.core.dataset import truth_message
     from proofroll.core.truth import truth
+    from proofroll.files.scene_sources import SeesTouches, source_of
     from proofroll.files.trajectory_file import import_xarray, write
 
     import_xarray()
 
-    start = time.perf_counter()
+    start, versions = time.perf_counter(), made_with("truth", case.engine.version)
+    source, path = source_of(case.scene) or (None, Path())
     try:
         dataset = truth(scene, times, *besides)
+        dataset = source.until_met(path, scene, dataset) if isinstance(source, SeesTouches) else dataset
     except (Refused, Diverged) as error:
         return _answer(error, versions)
     finally:

@@ -17,7 +17,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable
 from proofroll.core.controlled_engine import commanded
-from proofroll.core.dataset import BARS, BY_STEPS, CONTINUOUS, ENDED, ENDS, HORIZON, bar_until, columns_of
+from proofroll.core.dataset import BARS, BY_STEPS, CONTINUOUS, ENDED, ENDS, HORIZON, columns_of, ended_at
 from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.core.events import Event, with_events
@@ -174,10 +174,7 @@ def _to_horizon(dataset: xr.Dataset, apart: FloatArray, change: FloatArray) -> x
     dataset.attrs[HORIZON] = text
     if not beyond.size or beyond[0] < 1:
         return dataset
-    cut = dataset.isel(time=slice(0, int(beyond[0])))
-    for item in cut.data_vars.values():
-        item.attrs |= {"error_bar": bar_until(item.attrs, float(cut["time"][-1]))} if BARS in item.attrs else {}
-    return cut.assign_attrs({ENDS: float(times[beyond[0]]), ENDED: f"it is too sensitive from there on: {text}"})
+    return ended_at(dataset, int(beyond[0]), f"it is too sensitive from there on: {text}")
 
 
 def _steps(element: MechanismElement) -> list[float]:

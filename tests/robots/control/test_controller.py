@@ -52,7 +52,7 @@ def test_a_whole_file_is_read(tmp_path: Path) -> None:
     controller = read_controller(_written(tmp_path, FULL))
     controller.require_joints(JOINTS, KINDS)
     assert controller.period == 0.02
-    assert controller.driven(JOINTS) == ("L_HIP", "R_HIP", "L_KNEE", "R_KNEE")
+    assert controller.order == ("L_HIP", "R_HIP", "L_KNEE", "R_KNEE")
     assert controller.poses(JOINTS) == pytest.approx([0.5235987755982988, 0, 0, -1.5707963267948966], rel=1e-15)
     knee, hip = controller.servo("R_KNEE"), controller.servo("L_HIP")
     assert knee is not None
@@ -103,6 +103,7 @@ def test_targets_are_formulas_numbers_or_tables(tmp_path: Path) -> None:
         (("{FOOT = 0.016}", '{FOOT = "3 kg"}'), "ground.feet.FOOT = '3 kg': this number is in m"),
         (("{FOOT = 0.016}", "3"), "ground.feet = 3: give a table"),
         (("friction = 0.8", "friction = -1"), "ground.friction = -1.0: must be at least 0"),
+        (("[start]", "[start]\ndrop = -0.01"), "start.drop = -0.01: must be at least 0"),
         ((', "R_KNEE"]', "]"), "order = ['L_HIP', 'R_HIP', 'L_KNEE']: it lacks R_KNEE"),
         ((', "R_KNEE"]', ', "L_HIP"]'), "order = ['L_HIP']: a joint is in the order twice"),
         (("[start]", "start = 3\n[x]"), "there is no such key"),

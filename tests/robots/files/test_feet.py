@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from proofroll import load_scene, simulate
+from proofroll.core.dataset import ENDED, ENDS
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Tree
 from proofroll.elements.mechanism.contact.start import touches
-from proofroll.files.scene_sources import with_control
+from proofroll.files.scene_sources import source_of, with_control
 from proofroll.robots.protocol import lift
 
 pytest.importorskip("mujoco")
@@ -28,6 +29,7 @@ LEG = (
     '<body name="{name}" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 1 0" damping=".1" frictionloss=".05" '
     'armature=".01"/><inertial mass=".3" pos="0 0 -.1" diaginertia="1e-3 1e-3 2e-4"/>{foot}</body>'
 )
+FEET = {"left_foot", "right_foot", "rear_foot"}
 PLACES = {"left": (0.15, 0.1), "right": (0.15, -0.1), "rear": (-0.2, 0.0)}
 CONTROL = "rate = 50\n[pose]\nleft_hip = 0.1\n[ground]\n"
 
@@ -86,6 +88,14 @@ def test_a_drop_is_the_height_of_the_lowest_foot(stood: Callable[..., Scene]) ->
         assert _height(stood(robot(z=z), CONTROL + "[start]\ndrop = 0.05\n")) == pytest.approx(0.27, abs=1e-12)
 
 
+def test_a_drop_of_what_does_not_float_is_refused(stood: Callable[..., Scene]) -> None:
+    """A trunk on a slide is where its coordinate says: a drop is one line of advice, and none is needed."""
+    held = robot(z=0.25).replace('<freejoint name="root"/>', '<joint name="up" type="slide" axis="0 0 1"/>')
+    with pytest.raises(InputError, match=r"start\.drop = 0\.05: nothing here floats over a floor"):
+        stood(held, CONTROL + "[start]\ndrop = 0.05\n")
+    assert "moved up" not in stood(held).title
+
+
 def test_excluded_pairs_do_not_touch(stood: Callable[..., Scene]) -> None:
     """What the file excludes, or gives laws of its own, is as the file says."""
     after = (
@@ -96,6 +106,27 @@ def test_excluded_pairs_do_not_touch(stood: Callable[..., Scene]) -> None:
     assert {name: pair.friction for name, pair in pairs.items()} == {
         "left_foot on floor": 0.9, "right_foot on floor": 0.4,
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("asked", "end"), [("", 0.02), ("feet = {left = 0.02}\n", None), ("[start]\ndrop = 0.08\n", 0.024)]
+)
+def test_a_motion_ends_where_shapes_touch_that_the_scene_has_no_pair_of(
+    stood: Callable[..., Scene], tmp_path: Path, asked: str, end: float | None
+) -> None:
+    """A belly that the scout never saw near the floor ends a motion that sinks onto it; feet that sink end none."""
+    belly = '<geom name="belly" type="box" size=".1 .1 .02" mass="0"/>'
+    scene = stood(robot(trunk=belly), CONTROL + asked)
+    assert {pair.partition(" on ")[0] for pair in _pairs(scene)} == ({"left"} if end is None else FEET)
+    motion = simulate(scene, "mujoco", until=0.04, every=0.004, formulation="geoms")
+    sinks = (0.05 * np.arange(11))[:, None, None] * [0.0, 0.0, 1.0]
+    motion = motion.assign(p_WB=(motion["p_WB"].dims, motion["p_WB"].values[:1] - sinks))
+    source, path = source_of(with_control(str(tmp_path / "stool.xml"), tmp_path / "stand.toml")) or (None, Path())
+    cut = source.until_met(path, scene, motion)
+    assert cut.attrs.get(ENDS) == (end and pytest.approx(end))
+    if end is not None:
+        assert cut.attrs[ENDED] == "floor and belly touch, a pair that the scene lacks"
+        assert cut.sizes["time"] == round(end / 0.004)
 
 
 @pytest.mark.one_in(2)

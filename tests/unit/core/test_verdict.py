@@ -333,6 +333,17 @@ def test_a_tolerance_below_the_error_bar_of_the_truth_judges_nobody(error: float
     assert verdict_of(0.0, bar=3.8e-13, tolerance=4e-13).verdict is Verdict.AGREES
 
 
+@pytest.mark.parametrize("bar", [0.9e-3, 2e-3, math.inf])
+def test_a_reference_is_not_called_a_truth(bar: float) -> None:
+    """Where a reference is not known well enough, its bar or its silence is told as that of a reference."""
+    allowance, run = Allowance("z", "m", MILLIMETRE, 1.0), RunCurve(TRUE + 1.8e-3)
+    told = judge_curve(allowance, run, TrueCurve(TRUE, bar)).reason
+    assert "truth" in told
+    by_steps = judge_curve(allowance, run, TrueCurve(TRUE, bar, source="reference"))
+    assert by_steps.verdict is Verdict.NOT_JUDGED
+    assert by_steps.reason == told.replace("truth", "reference")
+
+
 @pytest.mark.parametrize("error", [0.2e-3, 1.8e-3])
 def test_an_error_that_the_truth_cannot_place_is_not_judged(error: float) -> None:
     """Where the truth's own error bar reaches across the tolerance nobody is said to agree or to differ."""

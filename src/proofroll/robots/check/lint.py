@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.elements.mechanism.reading.plausibility import LARGE, doubtful_body
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.robots.files.mjcf.parse import with_classes
+from proofroll.robots.files.mjcf.parse import classed
 from proofroll.robots.files.robot_file import LintRemark, RobotFile, floats, numbers
 from proofroll.robots.hypotheses.inertias import incomplete_inertias
 from proofroll.robots.model import Robot
@@ -202,7 +202,7 @@ def _urdf_angles(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]
 
 def _mjcf_joints(file: RobotFile) -> Iterator[tuple[str, str, str]]:
     degrees = not any(compiler.get("angle") == "radian" for compiler in file.root.iter("compiler"))
-    for joint, attributes in with_classes(file.root, "joint"):
+    for joint, _, _, attributes in classed(file.root, "joint"):
         place = f"joint {joint.get('name')}"
         if attributes.get("type") == "free":
             laws = [name for name in _LAWS if name not in joint.attrib and any(floats(attributes.get(name, "0")))]
@@ -212,8 +212,5 @@ def _mjcf_joints(file: RobotFile) -> Iterator[tuple[str, str, str]]:
         elif attributes.get("type", "hinge") == "hinge" and degrees and "range" in attributes:
             bounds = [abs(bound) for bound in floats(attributes["range"])]
             if any(abs(bound - angle) < 0.005 for bound in bounds for angle in _IN_RADIANS):
-                yield (
-                    "warning",
-                    place,
-                    f'range {attributes["range"]} is in degrees; radians need <compiler angle="radian"/>',
-                )
+                words = f'range {attributes["range"]} is in degrees; radians need <compiler angle="radian"/>'
+                yield "warning", place, words

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from proofroll.core.dataset import ended_at
 from proofroll.core.errors import InputError, Refused, error_location
 from proofroll.core.parameters import Parameters
+from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.contact.start import touches
 from proofroll.elements.mechanism.reading.reader import made_mechanism
@@ -26,7 +28,7 @@ from proofroll.elements.mechanism.scene.policy import PolicySource
 from proofroll.elements.mechanism.scene.rotations import from_quaternion
 from proofroll.elements.mechanism.scene.signal import value_at
 from proofroll.robots.control.controller import Controller, Gains, GroundContact, read_controller
-from proofroll.robots.files.feet import GROUNDS, NO_FLOOR, NO_GROUND, OF_FILE, StandingRobot, ground_tables
+from proofroll.robots.files.feet import GROUNDS, NO_FLOOR, NO_GROUND, OF_FILE, StandingRobot, ground_tables, met_besides
 from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.files.scene_tables import (
     CONTACTS,
@@ -46,21 +48,13 @@ from proofroll.robots.protocol import WATCHED, Reading, lift
 from proofroll.robots.states import RobotStates
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from proofroll.robots.control.base_frames import BaseFrame
     from proofroll.robots.control.bookkeeping.air import HeldRobot
 
-_NOTHING = Reading(
-    joints=(),
-    dofs=(),
-    mass={},
-    com={},
-    inertia={},
-    position={},
-    rotation={},
-    M=np.empty(0),
-    g=np.empty(0),
-    h=np.empty(0),
-)
+_NONE = np.empty(0)
+_NOTHING = Reading(joints=(), dofs=(), mass={}, com={}, inertia={}, position={}, rotation={}, M=_NONE, g=_NONE, h=_NONE)
 MOST = 2  # causes that act together
 _DURATION = 0.1  # s: what is wrong with the bookkeeping of a controller shows in the air within it
 _GRID, _STEP = 4e-3, 5e-4  # s: sampling of a first look, and its longest step
@@ -133,10 +127,22 @@ class ControlledScenes:
         Raises:
             InputError: the controller does not fit the robot, or the robot cannot be moved.
         """
-        controller = read_controller(self._path)
-        file, robot = self._robot(path, controller, _base(controller, int(values["ground"])))
-        tables = self._tables(file, robot, controller, values, always=bool(values["ground"]))
-        return self._grounded(file, robot, controller, tables, GROUNDS[int(values["ground"])])
+        controller, ground = read_controller(self._path), int(values["ground"])
+        standing, tables = self._standing(path, controller, values)
+        return self._grounded(standing, controller, tables, GROUNDS[ground]) if ground else tables
+
+    def until_met(self, path: Path, scene: Scene, motion: xr.Dataset) -> xr.Dataset:
+        """See :class:`proofroll.files.scene_sources.SeesTouches`."""
+        from proofroll.elements.mechanism.diagnosis.equations import placed_of
+
+        controller, ground = read_controller(self._path), int(scene.parameters["ground"])
+        if not ground or (controller.ground and not isinstance(controller.ground.feet, str)):
+            return motion
+        element: Any = scene.elements[0]
+        placed, (standing, _) = placed_of(element.mechanism, motion), self._standing(path, controller, scene.parameters)
+        states = {joint.name: placed.along(joint)[0] for joint in placed.mechanism.joints}
+        number, names = met_besides(standing, GROUNDS[ground], states) or (0, "")
+        return ended_at(motion, max(number, 1), f"{names} touch, a pair that the scene lacks") if names else motion
 
     def of_record(self, path: Path, *, free: bool) -> RecordedRobot:
         """Robot that a record is of, wherever it stands.
@@ -204,7 +210,8 @@ class ControlledScenes:
         with error_location(str(self._path)):
             followers = {mimic.joint for mimic in robot.mimics} if values.get("couplings") else set()
             single = [joint.name for joint in robot.moving if joint.dofs == 1 and joint.name not in followers]
-            of_file = _servos_of_file(robot)
+            rows = scene_actuators(robot)[0]
+            of_file = {row["joint"]: row for row in rows if row["kind"] == "position" or "limit" in row}
             positions = {name for name, row in of_file.items() if row["kind"] == "position"}
             controller.require_joints(single, {joint.name: joint.kind for joint in robot.moving}, positions)
             actuators = _actuators(robot, controller, single, of_file, file.driven)
@@ -217,34 +224,37 @@ class ControlledScenes:
         tables = tables_of(file, robot, start, values)
         return tables | {"actuators": actuators, **({} if control is None else {"control": control})}
 
-    def _grounded(
-        self, file: RobotFile, robot: Robot, controller: Controller, tables: dict[str, Any], ground: str
-    ) -> dict[str, Any]:
-        """Tables with those of a ground, above which the robot starts."""
-        if ground == NO_GROUND:
-            return tables
-        asked = controller.ground or GroundContact()
-        start = start_of(file, robot, controller, placed=True)
+    def _standing(
+        self, path: Path, controller: Controller, values: Mapping[str, float]
+    ) -> tuple[StandingRobot, dict[str, Any]]:
+        """The robot at its start with its servos, and tables of the scene without a ground."""
+        file, robot = self._robot(path, controller, _base(controller, int(values["ground"])))
+        tables = self._tables(file, robot, controller, values, always=bool(values["ground"]))
         servos = {
             row["joint"]: (row["kp"], row["kd"], [float(value_at(row["target"], time)) for time in _WATCHED])
             for row in tables["actuators"]
         }
-        standing = StandingRobot(
-            file=file,
-            robot=robot,
-            bodies=names_of_bodies(robot),
-            start=start,
-            servos=servos,
-            drop=controller.start.drop,
-        )
+        bodies, start = names_of_bodies(robot), start_of(file, robot, controller, placed=True)
+        drop = controller.start.drop
+        return StandingRobot(file=file, robot=robot, bodies=bodies, start=start, servos=servos, drop=drop), tables
+
+    def _grounded(
+        self, standing: StandingRobot, controller: Controller, tables: dict[str, Any], ground: str
+    ) -> dict[str, Any]:
+        """Tables with those of a ground, above which the robot starts."""
+        asked, robot = controller.ground or GroundContact(), standing.robot
         with error_location(str(self._path)):
             touching = ground_tables(standing, ground, asked.feet, asked.friction)
         tables = tables | {"geometries": touching.geometries, "pairs": touching.pairs, "impacts": TOGETHER}
-        way = _way_up(tables, robot, controller.start.drop)
+        drop = controller.start.drop
+        way = _way_up(tables, robot, drop)
+        if way is None and drop is not None:
+            advice = "nothing here floats over a floor, so nothing drops; leave it out, and begin higher by [start] q"
+            raise InputError(f"{self._path}: start.drop", drop, advice)
         up = -robot.gravity / np.linalg.norm(robot.gravity)
-        tables["joints"] = _lifted(tables["joints"], way * up)
+        tables["joints"] = _lifted(tables["joints"], (way or 0.0) * up)
         about = touching.about
-        if abs(way) > _SEEN and controller.start.drop is None:
+        if way is not None and abs(way) > _SEEN and drop is None:
             below = "what it stands on" if about.startswith(NO_FLOOR) else "the floor"
             about += f"; moved up by {1e3 * way:.3g} mm, as its start overlaps {below}"
         others = [clause for clause in tables["omitted"] if clause != CONTACTS]
@@ -289,18 +299,21 @@ def _base(controller: Controller, ground: int) -> str:
     return "free" if controller.start.base is not None or ground else "fixed"
 
 
-def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> float:
-    """Way against gravity to the start of the first body that floats [m], for the height of its lowest shape."""
+def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> float | None:
+    """Way against gravity to the start of the first body that floats [m], for the height of its lowest shape.
+
+    None: none floats over a floor.
+    """
     free = next((joint for joint in robot.moving if joint.kind == JointKind.FREE), None)
     size = float(np.linalg.norm(robot.gravity))
     if free is None or not size:
-        return 0.0
+        return None
     up = -robot.gravity / size
     planes = [row for row in tables["geometries"] if row["kind"] == "plane" and row["body"] == WORLD]
     slopes = {row["name"]: float(np.array(row.get("normal", Z)) @ up) for row in planes}
     floors = {name: slope for name, slope in slopes.items() if slope > _STEEP}
     if not floors:
-        return 0.0
+        return None
     raised = {key: value for key, value in tables.items() if key not in {"gravity", "omitted", "control"}}
     raised["joints"] = _lifted(tables["joints"], _ABOVE * up)
     x, y, z = robot.gravity.tolist()
@@ -315,7 +328,7 @@ def _way_up(tables: Mapping[str, Any], robot: Robot, drop: float | None) -> floa
         slope = floors.get(ends[contact.pair])
         if slope is not None and contact.body_a in lifted:
             heights.append(touch.gap / slope - _ABOVE)
-    return lift(min(heights), drop) if heights else 0.0
+    return lift(min(heights), drop) if heights else None
 
 
 def _lifted(joints: list[dict[str, Any]], way: Array) -> list[dict[str, Any]]:
@@ -369,12 +382,6 @@ def start_of(file: RobotFile, robot: Robot, controller: Controller, *, placed: b
             position[joint.name] = p[None]
     rest = {name: np.zeros_like(rates) for name, rates in velocity.items()}
     return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=rest)
-
-
-def _servos_of_file(robot: Robot) -> dict[str, dict[str, Any]]:
-    """Joint -> table of its position actuator in the file, or of another one that has a limit."""
-    rows = scene_actuators(robot)[0]
-    return {row["joint"]: row for row in rows if row["kind"] == "position" or "limit" in row}
 
 
 def _actuators(
@@ -445,8 +452,10 @@ def imported_robots(
         for causes, other_robot in changes:
             begun.append((causes, other_robot))
             with suppress(InputError, Refused):
-                ids, words = tuple(item.id for item in causes), "; ".join(_told(item) for item in causes)
-                yield replace(holder(other_robot), causes=ids, words=words)
+                engines = (", ".join(" ".join(filter(None, pair)) for pair in item.known.items()) for item in causes)
+                told = (f"{item.grounds}, as by {by}: {item.remedy}" for item, by in zip(causes, engines, strict=True))
+                ids = tuple(item.id for item in causes)
+                yield replace(holder(other_robot), causes=ids, words="; ".join(told))
 
 
 def _further(
@@ -461,20 +470,11 @@ def _further(
                 yield (*causes, cause), other_robot
 
 
-def _told(cause: RobotHypothesis) -> str:
-    engines = ", ".join(" ".join(part for part in item if part) for item in cause.known.items())
-    return f"{cause.grounds}, as by {engines}: {cause.remedy}"
-
-
 def _changed(file: RobotFile, robot: Robot, cause: RobotHypothesis) -> Robot | None:
     """Robot with a cause that needs the file alone; None: it needs more, changes nothing, or changes the joints."""
     evidence = RobotEvidence(file=file, robot=robot, reading=_NOTHING)
     other_robot = next(iter(cause.test(evidence)), None)
     if not isinstance(other_robot, Robot) or other_robot is robot:
         return None
-    return other_robot if _freedoms(other_robot) == _freedoms(robot) else None
-
-
-def _freedoms(robot: Robot) -> list[tuple[str, str]]:
-    """Joints that a record of a robot has columns of, with their kinds."""
-    return [(joint.name, joint.kind) for joint in robot.moving]
+    columns, other_columns = ([(joint.name, joint.kind) for joint in item.moving] for item in (robot, other_robot))
+    return other_robot if columns == other_columns else None

@@ -158,11 +158,14 @@ class Controller:
         yield "targets", next(iter(self.targets), ""), both, advice
         start, ground = self.start, self.ground
         advice = "give seven numbers: x, y, z in m and a quaternion of length 1, scalar first"
-        yield "start.base", start.base, start.base is not None and not _turned(start.base), advice
+        base = (*(start.base or ()),)
+        turned = len(base) == _BASE and abs(float(np.linalg.norm(base[3:])) - 1.0) < _UNIT_LENGTH
+        yield "start.base", start.base, start.base is not None and not turned, advice
         advice = "give six numbers: velocity in the world's axes in m/s, angular velocity in the body's axes in rad/s"
         yield "start.base_velocity", start.base_velocity, len(start.base_velocity) != _BASE_VELOCITY, advice
         advice = "it is a height above the ground; give [start] base"
         yield "start.drop", start.drop, start.drop is not None and ground is None, advice
+        yield "start.drop", start.drop, start.drop is not None and start.drop < 0, "must be at least 0"
         if ground is not None:
             feet, advice = ground.feet, f'give "{FEET}", or a table of links and radii in m, of one at least'
             wrong = feet != FEET if isinstance(feet, str) else not feet or min(feet.values()) < 0
@@ -182,11 +185,6 @@ class Controller:
     def names(self, joint: str) -> bool:
         """True if the controller names a joint itself, not by a pattern alone."""
         return joint in self.order or joint in self.targets or any(joint in gains.joints for gains in self.gains)
-
-    def driven(self, joints: Iterable[str]) -> tuple[str, ...]:
-        """Joints with gains, in the order of a policy's arrays."""
-        named = [joint for joint in joints if self.servo(joint)]
-        return self.order or tuple(named)
 
     def poses(self, joints: Sequence[str]) -> Array:
         """Default coordinates of joints [rad or m]; 0 for a joint without a pose."""
@@ -321,8 +319,3 @@ def _target(name: str, signal: Any) -> Signal:
     if isinstance(signal, str):
         signal = _NO_NUMBERS.filled(signal, name, {}, _PLACE)
     return checked(name, signal)
-
-
-def _turned(base: Sequence[float]) -> bool:
-    """True if seven numbers end with a quaternion of length 1, to the digits of a file."""
-    return len(base) == _BASE and abs(float(np.linalg.norm(base[3:])) - 1.0) < _UNIT_LENGTH

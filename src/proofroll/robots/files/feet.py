@@ -10,9 +10,9 @@ import itertools
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.etree.ElementTree import fromstring, tostring
 
 import numpy as np
 
@@ -38,6 +38,7 @@ NO_GROUND, OF_FILE, ON_A_PLANE = "none", "file", "plane"
 GROUNDS = (NO_GROUND, OF_FILE, ON_A_PLANE)
 FLOOR, NO_FLOOR = "floor", "no floor"
 _NAMED = 4  # links or shapes in a clause
+_MESH = "mesh of "  # begins a remark on a mesh of a body
 _FRICTION = 1.0  # of shapes of a URDF, which has none
 _ANOTHER_WAY = "give [ground] feet = {LINK = radius}, or take --ground none"
 # Pairs of shapes that have a rule of contact in a scene.
@@ -91,10 +92,6 @@ class StandingRobot:
     servos: Mapping[str, tuple[float, float, list[float]]]
     drop: float | None = None
 
-    def armature(self, joint: str) -> float:
-        """Inertia that is added to a joint's own coordinate."""
-        return next(item.armature for item in self.robot.moving if item.name == joint)
-
     def place(self, link: str) -> tuple[str, Array, Array]:
         """Body of the scene that carries a link, with the place [m] and axes of the link in it."""
         carrier, p, R = self.robot.carried(link)
@@ -117,22 +114,57 @@ def ground_tables(
     """
     if not isinstance(feet, str):
         return _balls(standing, feet, _FRICTION if friction is None else friction)
-    file = standing.file
-    of_urdf = file.kind == "urdf"
-    content, lost = _with_contacts(file)
+    pairs, lost = _near_pairs(standing, ground, {})
+    lifted = any(joint.kind == JointKind.FREE for joint in standing.robot.moving)
+    lifted = lifted and any(pair.on_plane for pair in pairs.values())
+    return _tables(standing.file, list(pairs.values()), friction, lost, lifted=lifted)
+
+
+def met_besides(standing: StandingRobot, ground: str, motion: Mapping[str, Array]) -> tuple[int, str] | None:
+    """First state in which shapes press each other that the scene has no pair of, and their names; None: none do.
+
+    A motion has coordinates of each joint as a start has them, shape (states, coordinates).
+    """
+    seen, met = (_near_pairs(standing, ground, states)[0] for states in ({}, motion))
+    paired = {names for names, pair in seen.items() if not any(pair.reasons(lifted=True))}
+    besides = ((pair.met, " and ".join(names)) for names, pair in met.items() if pair.touches and names not in paired)
+    return min(besides, default=None)
+
+
+def _near_pairs(
+    standing: StandingRobot, ground: str, motion: Mapping[str, Array]
+) -> tuple[dict[tuple[str, ...], _NearPair], list[str]]:
+    """Pairs of shapes of two bodies that come near each other in a motion, and clauses on shapes that the copy lacks.
+
+    Pairs are by the names of their shapes, of a URDF those with a floor. Without a ``motion`` servos move the robot.
+    """
+    file, lost = _with_contacts(standing.file)
+    start = standing.start
+    coordinates: dict[str, list[float]] = {name: values[:1].tolist() for name, values in start.angle.items()}
+    for name, matrices in start.rotation.items():
+        turned = to_quaternion(matrices[0]).tolist()
+        coordinates[name] = [*start.position[name][0].tolist(), *turned] if name in start.position else turned
+    of_urdf, armature = file.kind == "urdf", {joint.name: joint.armature for joint in standing.robot.moving}
     asked = {
-        "start": _coordinates(standing.start),
-        "servos": {name: [*gains, standing.armature(name)] for name, gains in standing.servos.items()},
-        "base_joint": BASE_JOINT if of_urdf and file.base == "free" else "",
+        "start": coordinates,
+        "servos": {name: [*gains, armature[name]] for name, gains in standing.servos.items()},
+        "base_joint": BASE_JOINT if of_urdf and standing.file.base == "free" else "",
         "floor": of_urdf or ground == ON_A_PLANE,
         "drop": standing.drop,
+        "motion": motion,
     }
-    rows = _near(file.path, file.kind, content, dict(plain(asked)))
+    with tempfile.TemporaryDirectory() as folder:
+        copy = reading.write(file, Path(folder))
+        ask = partial(near_shapes, path=file.path, copy=copy, asked=dict(plain(asked)), time_limit=TIME_LIMIT)
+        rows, _ = by_definer("mjcf", file.path, None, ask)
     shapes = [_shape(standing, row) for row in rows["shapes"]]
-    pairs = [_NearPair(**row | {"shapes": tuple(shapes[k] for k in row["shapes"])}) for row in rows["pairs"]]
-    pairs = [pair for pair in pairs if pair.moves and (pair.on_floor or not of_urdf)]
-    lifted = any(joint.kind == JointKind.FREE for joint in standing.robot.moving)
-    return _tables(file, pairs, friction, lost, lifted=lifted and any(pair.on_plane for pair in pairs))
+    pairs = {}
+    for row in rows["pairs"]:
+        both = tuple(shapes[k] for k in row["shapes"])
+        pair = _NearPair(**row | {"shapes": both})
+        if both[0].body != both[1].body and (pair.on_floor or not of_urdf):
+            pairs[tuple(shape.name for shape in both)] = pair
+    return pairs, lost
 
 
 class _Shape(NamedTuple):
@@ -197,6 +229,7 @@ class _NearPair:
         softness: time constant [s] and damping ratio, or two negative numbers.
         margin: distance from which it presses [m].
         distance, start: the least one that was seen, and that at the start [m].
+        met: first step or state in which they pressed each other; -1: they did not.
         face: axis and side of the face of a box of the world within whose borders they met; empty: there is none.
     """
 
@@ -207,6 +240,7 @@ class _NearPair:
     margin: float
     distance: float
     start: float
+    met: int
     face: Sequence[int]
 
     def __post_init__(self) -> None:
@@ -219,12 +253,7 @@ class _NearPair:
     @property
     def touches(self) -> bool:
         """True if they pressed each other."""
-        return self.distance <= max(self.margin, 0.0)
-
-    @property
-    def moves(self) -> bool:
-        """True if the shapes are of two bodies."""
-        return self.shapes[0].body != self.shapes[1].body
+        return self.met >= 0
 
     @property
     def on_plane(self) -> bool:
@@ -235,11 +264,6 @@ class _NearPair:
     def on_floor(self) -> bool:
         """True if one shape is a plane of the world, and no face of a box."""
         return self.on_plane and not self.face
-
-    @property
-    def on_face(self) -> bool:
-        """True if one shape is the plane of a box's face."""
-        return self.on_plane and bool(self.face)
 
     @property
     def grown(self) -> tuple[float, float]:
@@ -300,7 +324,7 @@ def _tables(
             else:
                 left_out.append(f"contact of {names}, {1e3 * pair.distance:.0f} mm apart ({reasons[0]})")
             continue
-        if pair.on_face:
+        if pair.on_plane and pair.face:
             endless.setdefault(pair.shapes[1].name, []).append(pair.shapes[0].name)
         laws = pair.table(friction)
         stands += [(pair.shapes[0].name, laws["friction"])] if pair.on_floor else []
@@ -320,7 +344,8 @@ def _tables(
         advice = "give [ground] feet = {LINK = radius}, or take --ground plane or none"
         raise InputError("ground", file.path, f"{near}; {advice}")
     left_out += [f"edges of {face}, which is endless for {_listed(shapes)}" for face, shapes in endless.items()]
-    left_out.append(f"pairs of shapes that come near only after {WATCHED:g} s, or in another motion")
+    later = f"pairs of shapes that come near only after {WATCHED:g} s, or in another motion"
+    left_out.append(f"{later} (a truth or reference ends where they touch)")
     return GroundTables(list(geometries.values()), rows, _about(stands, others), left_out)
 
 
@@ -367,44 +392,20 @@ def _shape(standing: StandingRobot, row: Mapping[str, Any]) -> _Shape:
     )
 
 
-def _coordinates(start: RobotStates) -> dict[str, list[float]]:
-    """Joint -> coordinates of a start, as :func:`proofroll.robots.importers.mujoco_model.near_shapes` takes them."""
-    rows: dict[str, list[float]] = {name: values[:1].tolist() for name, values in start.angle.items()}
-    for name, matrices in start.rotation.items():
-        turned = to_quaternion(matrices[0]).tolist()
-        rows[name] = [*start.position[name][0].tolist(), *turned] if name in start.position else turned
-    return rows
-
-
-def _with_contacts(file: RobotFile) -> tuple[bytes, list[str]]:
-    """Text of the copy of a file that keeps its contacts, and clauses on shapes that it lacks."""
+def _with_contacts(file: RobotFile) -> tuple[RobotFile, list[str]]:
+    """The file with its contacts, and clauses on shapes that it lacks."""
     if file.kind == "urdf":
-        links = [link for link in read_xml(file.path).iter("link") if link.find("collision//mesh") is not None]
-        return tostring(file.root, "utf-8"), _meshes([link.get("name", "") for link in links])
-    copy = opened(file.path, file.base, contacts=True)
-    lost = dict.fromkeys(remark.where for remark in copy.remarks if remark.what == NO_SHAPE)
-    meshes = [where.removeprefix("mesh of ") for where in lost if where.startswith("mesh of ")]
-    return tostring(copy.root, "utf-8"), [
-        *_meshes(meshes),
-        *(where for where in lost if not where.startswith("mesh of ")),
-    ]
-
-
-def _meshes(links: Sequence[str]) -> list[str]:
-    """Clause on the meshes of links that collide in a file."""
-    return [f"collision meshes of {_listed(links)}"] if links else []
+        links = (link for link in read_xml(file.path).iter("link") if link.find("collision//mesh") is not None)
+        lost = [f"{_MESH}{link.get('name', '')}" for link in links]
+    else:
+        file = opened(file.path, file.base, contacts=True)
+        lost = list(dict.fromkeys(remark.where for remark in file.remarks if remark.what == NO_SHAPE))
+    meshes = [where.removeprefix(_MESH) for where in lost if where.startswith(_MESH)]
+    clauses = [f"collision meshes of {_listed(meshes)}"] if meshes else []
+    return file, [*clauses, *(where for where in lost if not where.startswith(_MESH))]
 
 
 def _listed(names: Sequence[str]) -> str:
     """The first names, and the number of the others."""
     others = counted(len(names) - _NAMED, "others")
     return ", ".join(names[:_NAMED]) + (f" and {others}" if names[_NAMED:] else "")
-
-
-def _near(path: Path, kind: str, content: bytes, asked: dict[str, Any]) -> dict[str, Any]:
-    """Shapes that come near each other in a robot file of this content; see the function that answers."""
-    file = RobotFile(path, kind, fromstring(content))
-    with tempfile.TemporaryDirectory() as folder:
-        copy = reading.write(file, Path(folder))
-        answer, _ = by_definer("mjcf", path, None, lambda worker: near_shapes(worker, path, copy, asked, TIME_LIMIT))
-    return answer

@@ -191,22 +191,18 @@ def _joint(
     v = (1.0 if values.get("keyframe") else values.get("speed", 1.0)) * start.velocity[joint.name][0]
     if joint.kind == JointKind.FREE:  # its coordinates are relative to the world, whatever its parent is
         turned = start.rotation[joint.name][0]
-        q = [*start.position[joint.name][0], *_quaternion(turned)]
+        q = [*start.position[joint.name][0], *to_quaternion(turned).tolist()]
         return table | laws | {"q0": q, "v0": [*(turned.T @ v[:3]), *(turned.T @ v[3:])]}
     table["position"] = (p + R @ joint.position).tolist()
     table["orientation"] = list(to_rpy(R @ joint.rotation))
     if joint.kind == JointKind.SPHERICAL:
-        table |= {"q0": list(_quaternion(start.rotation[joint.name][0]))}
+        table |= {"q0": to_quaternion(start.rotation[joint.name][0]).tolist()}
     else:
         table |= {"axis": joint.axis.tolist(), "q0": [float(start.angle[joint.name][0])], "rest": joint.rest}
     table |= laws | {"v0": v.tolist()}
     if values.get("limits") and joint.lower is not None and joint.upper is not None and joint.lower < joint.upper:
         table["limits"] = [joint.lower, joint.upper]
     return table
-
-
-def _quaternion(R: Array) -> Any:
-    return to_quaternion(R).tolist()
 
 
 def _coupled(robot: Robot) -> Iterator[dict[str, Any]]:

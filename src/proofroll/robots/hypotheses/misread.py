@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.robots.files.mjcf.parse import with_classes
+from proofroll.robots.files.mjcf.parse import classed
 from proofroll.robots.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
 from proofroll.robots.model import NO_BODY, Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import Reading
@@ -134,14 +134,14 @@ def meshes_weigh_one_kilogram(evidence: RobotEvidence) -> Robot | None:
     collides = {name: list(source.get("collides", ())) for name, source in evidence.robot.sources.items()}
 
     def edit(root: Element) -> bool:
-        effective = {id(geom): attributes for geom, attributes in with_classes(root, "geom")}
+        effective = {id(item.element): item.given for item in classed(root, "geom")}
         touched = False
         for body in root.iter("body"):
             shapes = body.findall("geom")
             hits = collides.get(str(body.get("name")), [])
             for shape, weighs in zip(shapes, hits if len(hits) == len(shapes) else [True] * len(shapes), strict=True):
-                classed = effective[id(shape)]
-                if weighs and (classed.get("type") == "mesh" or classed.get("mesh")):
+                given = effective[id(shape)]
+                if weighs and (given.get("type") == "mesh" or given.get("mesh")):
                     _without([shape], "mesh", "density", "shellinertia")
                     shape.attrib |= {"type": "sphere", "size": repr(_UNIT_BALL), "mass": "1"}
                     touched = True

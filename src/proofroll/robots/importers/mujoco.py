@@ -36,6 +36,7 @@ class MujocoRobots:
         "boundmass": "raise every mass to 1e-6 kg and every inertia to 1e-8 kg m²",
     }
     says: ClassVar[str] = ""
+    near_shapes = staticmethod(near_shapes)
 
     @property
     def tolerances(self) -> dict[str, float]:
@@ -58,10 +59,6 @@ class MujocoRobots:
         spec = mujoco.MjSpec.from_file(str(path))
         spec.compile()
         return written(spec)
-
-    def near_shapes(self, path: Path, **asked: Any) -> dict[str, Any]:
-        """See :func:`proofroll.robots.importers.mujoco_model.near_shapes`."""
-        return near_shapes(path, **asked)
 
     def as_written(self, request: Request) -> Whole:
         """Degrees of freedom and moving mass [kg] of the unchanged file, loaded from its path."""

@@ -42,6 +42,7 @@ def near_shapes(
     base_joint: str,
     floor: bool,
     drop: float | None,
+    motion: Mapping[str, Sequence[Sequence[float]]],
 ) -> dict[str, Any]:
     """Shapes that come nearer than 2 cm to another one within a second, as plain data.
 
@@ -54,10 +55,12 @@ def near_shapes(
         base_joint: name of the joint that frees the root of a URDF; empty: nothing does.
         floor: True for a floor z = 0 in place of the file's planes; each shape that collides with any collides with it.
         drop: height of the lowest shape over the floor [m]; None: as it is, or 1 cm where it overlaps the floor.
+        motion: joint -> coordinates as in ``start`` in each state of a motion in place of that second; empty: none.
 
     Returns:
         ``shapes`` as by :func:`_shape`; ``pairs`` with the numbers of two ``shapes``, their laws, the least
-        ``distance`` [m] and that at the ``start``, and the ``face`` of a box by :func:`_face`.
+        ``distance`` [m] and that at the ``start``, the first step or state in which they ``met`` (-1: they did not),
+        and the ``face`` of a box by :func:`_face`.
     """
     model = _compiled(path, base_joint, floor=floor)
     data = mujoco.MjData(model)
@@ -67,33 +70,33 @@ def near_shapes(
     _widen(model.geom_gap, model.geom_margin, _NEAR / 2 if _gap_widens() else _NEAR)
     _widen(model.pair_gap, model.pair_margin, _NEAR)
     places = [int(model.joint(name).qposadr[0]) for name in servos]
-    for step in range(min(int(WATCHED / model.opt.timestep), int(_MOST / max(model.nv, 1)))):
+    steps = min(int(WATCHED / model.opt.timestep), int(_MOST / max(model.nv, 1)))
+    for step in range(len(next(iter(motion.values()))) if motion else steps):
         for place, (_, _, targets, _) in zip(places, servos.values(), strict=True):
             model.qpos_spring[place] = model.qpos0[place] + targets[int(len(targets) * data.time / WATCHED)]
-        mujoco.mj_step(model, data)
+        _pose(model, data, {name: states[step] for name, states in motion.items()})
+        (mujoco.mj_fwdPosition if motion else mujoco.mj_step)(model, data)
         if not np.isfinite(data.qacc).all() or data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number:
             break
         for contact in data.contact[: data.ncon]:
             first, second = sorted(contact.geom.tolist())
             face = _face(model, data, contact)
-            laws = found.setdefault((first, second), _laws(contact) | {"face": face, "start": _NEAR})
+            as_combined = {
+                "dim": int(contact.dim),
+                "friction": contact.friction.tolist(),
+                "softness": contact.solref.tolist(),
+                "margin": float(contact.includemargin),
+            }
+            unseen = {"distance": float(contact.dist), "face": face, "start": _NEAR, "met": -1}
+            laws = found.setdefault((first, second), as_combined | unseen)
+            if laws["met"] < 0 and contact.dist <= max(contact.includemargin, 0.0):
+                laws["met"] = step
             laws["distance"] = min(laws["distance"], float(contact.dist))
             laws["face"] = face if laws["face"] == face else []
             laws["start"] = laws["start"] if step else min(laws["start"], float(contact.dist))
     geoms = sorted({geom for pair in found for geom in pair})
     pairs = [{"shapes": [geoms.index(geom) for geom in pair]} | laws for pair, laws in sorted(found.items())]
     return {"shapes": [_shape(model, geom) for geom in geoms], "pairs": pairs}
-
-
-def _laws(contact: Any) -> dict[str, Any]:
-    """Laws of a contact as MuJoCo combined those of its shapes."""
-    return {
-        "dim": int(contact.dim),
-        "friction": contact.friction.tolist(),
-        "softness": contact.solref.tolist(),
-        "margin": float(contact.includemargin),
-        "distance": float(contact.dist),
-    }
 
 
 def _face(model: Any, data: Any, contact: Any) -> list[int]:
@@ -140,17 +143,21 @@ def _put(model: Any, data: Any, start: Mapping[str, Sequence[float]], servos: Ma
     """Sets the start, and the springs and dampers of joints in place of actuators."""
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
-    for name, values in start.items():
-        joint = model.joint(name)
-        place = int(joint.qposadr[0])
-        data.qpos[place : place + len(values)] = values
-        if len(values) == 1:
-            data.qpos[place] += model.qpos0[place]
+    _pose(model, data, start)
     for name, (kp, kd, _, armature) in servos.items():
         joint = model.joint(name)
         model.jnt_stiffness[joint.id] = kp
         model.dof_damping[joint.dofadr[0]] += kd
         model.dof_armature[joint.dofadr[0]] = armature
+
+
+def _pose(model: Any, data: Any, coordinates: Mapping[str, Sequence[float]]) -> None:
+    """Sets coordinates of joints; those of one axis count from the pose of the file."""
+    for name, values in coordinates.items():
+        place = int(model.joint(name).qposadr[0])
+        data.qpos[place : place + len(values)] = values
+        if len(values) == 1:
+            data.qpos[place] += model.qpos0[place]
 
 
 def _lift(model: Any, data: Any, drop: float | None) -> None:

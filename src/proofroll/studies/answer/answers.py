@@ -39,7 +39,7 @@ from proofroll.studies.answer.search import (
 )
 from proofroll.studies.answer.setting_search import BRIEF, WHOLE, SearchCaps, SettingSearch, State
 from proofroll.studies.judging.asked_tolerance import AskedTolerance, orientations_of
-from proofroll.studies.judging.reference import Reference
+from proofroll.studies.judging.reference import OWN_STEPS, Reference
 from proofroll.studies.study_store import conditions_now, keep_study, valid_study
 from proofroll.studies.swept_settings import Curve
 
@@ -109,6 +109,10 @@ def _answered(
     answered = answered_scene(question, tolerance, reference)
     bounds = answered.bounds
     searches = [] if answered.open else settings_of(question, curves, answered.allowed, answered.sizes, caps)
+    for search in searches:
+        others = [item for item in search.settings if item.facts.formulated != reference.by_steps]
+        if len(others) < len(search.settings):
+            search.settings, search.cannot = others, OWN_STEPS
     lacking = [EngineSearch(engine=name, settings=[], cannot=why) for name, why in absent.items()]
     generators = [searching(search, question) for search in searches]
     abreast.run(generators, lambda number: tell(engine_answer(searches[number], bounds), question.until))

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.multi_element import represents
@@ -17,6 +18,7 @@ from proofroll.studies.answer.records import StepAnswer
 from proofroll.studies.answer.search import EngineSearch, SearchesAbreast, searching
 from proofroll.studies.answer.setting_search import SettingSearch, State
 from proofroll.studies.judging.asked_tolerance import AskedTolerance
+from proofroll.studies.judging.reference import OWN_STEPS
 from proofroll.studies.study_store import conditions_now
 
 # Halvings from the coarsest step that is run to the person's own: samples are at whole steps of its double and of four
@@ -63,6 +65,8 @@ def step_answer(
     abreast = SearchesAbreast(references, runner)
     reference = abreast.references[question.every]
     answered = answered_scene(question, asked, reference)
+    if own.formulated == reference.by_steps:
+        answered = replace(answered, open=answered.open or OWN_STEPS)
     spec = parse_engine(engine)
     options = {key: value for key, value in spec.options.items() if key != resolution}
     size = float(own.settings[resolution])

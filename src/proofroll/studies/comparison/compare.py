@@ -25,7 +25,7 @@ from proofroll.studies.comparison.expectations import contradictions_of
 from proofroll.studies.comparison.outcome import ComparedPoint, LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import Plan, Planned, at_point, plan, point_name
 from proofroll.studies.judging import run_values
-from proofroll.studies.judging.reference import Reference
+from proofroll.studies.judging.reference import OWN_STEPS, Reference
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 _OF_TRUTHS = 0.8  # largest part of a budget that truths take, at first and again for a shorter time
 _PARTS = (1, 8, 64)  # parts of the time, the first of which is tried
-_OWN_STEPS = "its steps are the reference, which is no judge of itself"
 _LEAST = 2  # samples of a truth with which a motion is judged: at the first one nothing has moved yet
 
 
@@ -53,7 +52,8 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
             judged.append(_run(run, Result(status_of(run.facts), str(run.facts))))
             continue
         if run.is_reference:
-            judged.append(_run(run, Result(Status.NO_TRUTH, _OWN_STEPS)))
+            own = Result(Status.NO_TRUTH, OWN_STEPS)
+            judged.append(_run(run, own) if point.result.status == Status.DONE else _without_truth(run, point, own))
             continue
         result = results[run.ladder[1.0].key]
         if result.trajectory is None or result.status != Status.DONE:

@@ -238,7 +238,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
             ladder = {
                 factor: _case(comparison, scene, point, rung, timed=comparison.timed and factor == 1)
                 for factor, rung in ladder_facts.items()
-                if f"{facts.name}[formulation={facts.settings['formulation']}]" != reference
+                if facts.formulated != reference
             }
             spare = len(ladder) > 1 and point not in with_ladder
             runs.append(Planned(row, point, facts.on(scene.requires), ladder, spare=spare))

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+OWN_STEPS = "its steps are the reference, which is no judge of itself"  # of the formulation of a reference by steps
 # Samples on each side of an event through which a parabola is laid.
 _SIDE = 3
 
@@ -193,7 +194,8 @@ class Reference:
     def true(self, name: str, values: FloatArray) -> TrueCurve:
         """True curve of an observable, of infinite error bar if there are no values; ``values`` are an engine's."""
         curve, bar = self._known(name, values)
-        return TrueCurve(self._on_either_side(name, curve, values), bar, self.ill_posed_for(name))
+        curve, source = self._on_either_side(name, curve, values), "reference" if self.by_steps else "truth"
+        return TrueCurve(curve, bar, self.ill_posed_for(name), source)
 
     def _on_either_side(self, name: str, curve: FloatArray, values: FloatArray) -> FloatArray:
         """True curve with a run's own values at samples on an impact, where what jumps has a value on each side.

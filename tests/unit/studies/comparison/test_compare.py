@@ -582,6 +582,18 @@ def test_a_point_where_the_truth_is_lost(tmp_path: Path, status: Status, clause:
     assert exit_code([outcome]) == 3
 
 
+@pytest.mark.parametrize("steps", [True, False])
+def test_a_row_whose_steps_gave_no_reference_says_why(tmp_path: Path, steps: bool) -> None:
+    """Its steps are called the reference where there is one; where they ended, the row has the reason as others do."""
+    ended = Result(Status.DIVERGED, "the steps of alpha end: they do not settle")
+    planned, results, runner = answered(tmp_path, claim([ROW], [4.0]), the_truth, {} if steps else {4.0: ended})
+    planned = dataclasses.replace(planned, runs=[dataclasses.replace(run, ladder={}) for run in planned.runs])
+    (run,) = evaluate(planned, results, runner).runs
+    assert run.verdict is Verdict.NOT_JUDGED
+    words = "its steps are the reference, which is no judge of itself"
+    assert run.result.message == (words if steps else ended.message)
+
+
 @pytest.mark.parametrize(("longest", "until"), [(1.0, 0.4), (0.1, 0.05), (0.001, 0.4)])
 def test_a_budget_buys_the_time_that_a_truth_ends_in(longest: float, until: float) -> None:
     """A truth that does not end in a part of the budget is asked for a shorter time; without one no engine is run."""

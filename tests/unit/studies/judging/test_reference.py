@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from proofroll.core.dataset import ENDED, ENDS, off_impacts
+from proofroll.core.dataset import BY_STEPS, ENDED, ENDS, off_impacts
 from proofroll.core.engine_abilities import SharesEquations
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
@@ -204,6 +204,16 @@ def test_an_answer_leaves_out_what_the_truth_does_not_tell(monkeypatch: pytest.M
     monkeypatch.setattr(run_values, "observables_of", lambda *_: given)
     errors, *_ = errors_of(places, held, whole=True)
     assert errors == {"positions": 0.5}
+
+
+@pytest.mark.parametrize(("steps", "source"), [({BY_STEPS: "alpha"}, "reference"), ({}, "truth")])
+def test_curves_say_whether_they_are_of_a_truth(steps: dict[str, str], source: str) -> None:
+    """What steps lead to is a reference, whose error bar is not that of a truth."""
+    times = np.linspace(0.0, 0.1, 3)
+    scene, values = load_scene("sphere_in_cylinder"), np.zeros((2, 1))
+    height = xr.Dataset({"z": ("time", times, {"error_bar": 0.0})}, {"time": times}, steps)
+    held = Reference(scene, height, {"z": values}, {})
+    assert held.true("z", values).source == source
 
 
 def against(formulation: str, **parameters: float) -> str:

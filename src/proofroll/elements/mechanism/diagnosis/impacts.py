@@ -1,12 +1,12 @@
 """Hypotheses of impacts: they come late, or have another restitution or friction."""
 
 import functools
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
@@ -70,15 +70,16 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
             yield late.cause("late impact", says, remainder, remedy, 1, explains=len(met))
         coefficients = np.array([law[k] for k, _ in met])
         difference = float(np.abs(seen - coefficients).max())
-        if difference <= _RATIO:
+        if not _RATIO < difference < np.inf:
             continue
         restitution, of_each = Difference("restitution", "1", difference, TOUCHING_MOTION), sorted({k for k, _ in met})
-        for order in itertools.permutations(of_each):
-            moved = dict(zip(of_each, order, strict=True))
-            remainder = float(np.max(np.abs(seen - [law[moved[k]] for k, _ in met]) + seen_bars))
-            swaps = "; ".join(f"{names[a]} has that of {names[b]}" for a, b in moved.items() if a != b)
-            says = f"restitution is of another pair: {swaps}"
-            yield restitution.cause("restitution", says, remainder, "give each pair its own")
+        off = np.abs(seen - np.array([law[k] for k in of_each])[:, None]) + seen_bars
+        off = np.array([off[:, [k == pair for k, _ in met]].max(axis=1) for pair in of_each])
+        moved = linear_sum_assignment(off)[1].tolist()
+        remainder = float(off[range(len(off)), moved].max())
+        swaps = "; ".join(f"{names[of_each[a]]} has that of {names[of_each[b]]}" for a, b in enumerate(moved) if a != b)
+        says = f"restitution is of another pair: {swaps}"
+        yield restitution.cause("restitution", says, remainder, "give each pair its own")
         factor = float(seen @ coefficients / (coefficients @ coefficients)) if coefficients.any() else np.nan
         says = f"restitution of all pairs is {factor_text(factor)}"
         remainder = float(np.max(np.abs(seen - factor * coefficients) + seen_bars))

@@ -5,11 +5,12 @@ from __future__ import annotations
 import atexit
 import contextlib
 import hashlib
+import itertools
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 from xml.etree import ElementTree
@@ -64,14 +65,9 @@ def compile_robot(path: str, original: str | None) -> dict[str, Any]:
     return _defined(Path(path), answer)
 
 
-def expand_robot(path: str) -> dict[str, Any]:
-    """Worker's side of :func:`expand`: the file's text with macros written out."""
-    return _defined(Path(path), lambda reader: {"text": reader.expanded(Path(path))})
-
-
-def find_near_shapes(path: str, asked: dict[str, Any]) -> dict[str, Any]:
-    """Worker's side of :func:`near_shapes`: shapes and pairs as plain data."""
-    return _defined(Path(path), lambda reader: {"near": reader.near_shapes(Path(path), **asked)})
+def ask_reader(path: str, method: str, **asked: Any) -> dict[str, Any]:
+    """Worker's side of :func:`expand` and :func:`near_shapes`: what a method of the reader says of a file."""
+    return _defined(Path(path), lambda reader: {"answer": getattr(reader, method)(Path(path), **asked)})
 
 
 def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
@@ -137,11 +133,11 @@ def near_shapes(
         InputError: the engine that defines MJCF cannot read the copy, or is not installed.
         WorkerDied: the engine crashed or took too long.
     """
-    answer = worker.request(call(find_near_shapes, path=str(copy), asked=dict(asked)), time_limit)
-    if "near" not in answer:
+    answer = worker.request(call(ask_reader, path=str(copy), method="near_shapes", **asked), time_limit)
+    if "answer" not in answer:
         message = answer.get("message") or answer["uncovered"]
         raise InputError("ground", path, f"its shapes cannot be read: {message}; take --ground none")
-    return answer["near"], Compiler(*answer["by"])
+    return answer["answer"], Compiler(*answer["by"])
 
 
 def expand(
@@ -163,10 +159,11 @@ def expand(
         folder = Path(name)
         for part, content in parts.items():
             (folder / part).write_bytes(ElementTree.tostring(content, encoding="utf-8"))
-        answer = worker.request(call(expand_robot, path=str(folder / next(iter(parts)))), time_limit)
-    if "text" not in answer:
+        copy = str(folder / next(iter(parts)))
+        answer = worker.request(call(ask_reader, path=copy, method="expanded"), time_limit)
+    if "answer" not in answer:
         raise InputError("file", path, f"its macros cannot be written out: {answer['message']}")
-    return ElementTree.fromstring(answer["text"]), Compiler(*answer["by"])
+    return ElementTree.fromstring(answer["answer"]), Compiler(*answer["by"])
 
 
 class AnswersQuestions(Protocol):
@@ -207,7 +204,9 @@ class Definer:
 
     def _place(self, request: Mapping[str, Any]) -> Path | None:
         """File of the answer, by the content of what is asked about and the times of the files beside it."""
-        files = list(_files_below(self._path.resolve().parent))
+        folders = os.walk(self._path.resolve().parent)
+        below = (os.path.join(root, name) for root, _, names in folders for name in names)
+        files = list(itertools.islice(below, _MOST + 1))
         if len(files) > _MOST:
             return None
         arguments = dict(request["arguments"])
@@ -218,16 +217,6 @@ class Definer:
             return None
         text = json.dumps([request["function"], arguments, stats], sort_keys=True, default=str)
         return _folder() / f"{hashlib.sha256(content + text.encode()).hexdigest()}.json"
-
-
-def _files_below(folder: Path) -> Iterator[str]:
-    """Paths of files below a folder, one more than are looked at at most."""
-    count = 0
-    for root, _, names in os.walk(folder):
-        for name in names:
-            yield os.path.join(root, name)
-            if (count := count + 1) > _MOST:
-                return
 
 
 def _folder() -> Path:

@@ -24,6 +24,7 @@ from proofroll.robots.files.robot_file import (
     required_file,
 )
 
+_STATE = ("qpos", "qvel", "ctrl")  # vectors of a keyframe
 _MAIN = "main"  # default class of elements that name none
 # Largest depth of includes.
 _DEEPEST = 8
@@ -73,11 +74,6 @@ def classed(root: Element, tag: str) -> Iterator[Classed]:
         yield from below(world, world, main)
 
 
-def with_classes(root: Element, tag: str) -> Iterator[tuple[Element, dict[str, str]]]:
-    """All elements of a tag below <worldbody>, with their attributes, own and inherited from the class."""
-    return ((item.element, item.given) for item in classed(root, tag))
-
-
 def _classes(root: Element, tag: str) -> dict[str, dict[str, str]]:
     """Class -> attributes that it gives to elements of a tag, own and inherited from the classes around it."""
     classes: dict[str, dict[str, str]] = {}
@@ -109,7 +105,9 @@ def neutral_mjcf(
     parts: dict[str, Element] = {}
     remarks, contained = _add(root, path, path.resolve(), inside, parts, contacts=contacts)
     root = next(iter(parts.values()))
-    keyframes = tuple(_keyframe(key) for part in root.findall("keyframe") for key in part.findall("key"))
+    keys = [key for part in root.findall("keyframe") for key in part.findall("key")]
+    vectors = ({name: tuple(numbers(key, name, "", len(key.get(name, "").split()))) for name in _STATE} for key in keys)
+    keyframes = tuple(Keyframe(key.get("name", ""), **states) for key, states in zip(keys, vectors, strict=True))
     for part in parts.values():
         part[:] = [child for child in part if child.tag != "keyframe"]
     macros = [name for name in sorted(_MACROS) if any(part.find(f".//{name}") is not None for part in parts.values())]
@@ -123,14 +121,6 @@ def neutral_mjcf(
         remarks.append(LintRemark("note", names, "written out by the engine that defines the format, to six digits"))
     name_all(root)
     return root, remarks, contained, keyframes
-
-
-def _keyframe(key: Element) -> Keyframe:
-    """Keyframe of an element."""
-    qpos, qvel, ctrl = (
-        tuple(numbers(key, name, "", len(key.get(name, "").split()))) for name in ("qpos", "qvel", "ctrl")
-    )
-    return Keyframe(key.get("name", ""), qpos, qvel, ctrl)
 
 
 def _written_out(element: Element) -> float:
@@ -157,8 +147,12 @@ def _add(
         count = len(root.findall("worldbody"))
         _include(root, path, file.parent, inside, (file,))
         _merge_defaults(root)
-        if len(root.findall("worldbody")) > count:
-            _merge_worlds(root)
+        # Pinocchio reads a tree twice if there are two worlds, and refuses a class that is defined after its use.
+        *others, last = root.findall("worldbody") or [root]
+        if len(others) >= count:
+            last[:] = [child for world in (*others, last) for child in world]
+            for world in others:
+                root.remove(world)
     contained = names_files_inside(root, file.parent, inside)
     for extension in [*root.iter("extension")]:
         extension[:] = []
@@ -231,17 +225,6 @@ def _merge_defaults(root: Element) -> None:
                 present.attrib |= child.attrib
         whole.extend(included.findall("default"))
         root.remove(included)
-
-
-def _merge_worlds(root: Element) -> None:
-    """Merges all <worldbody> elements, those of included files too, into the last one; their meaning stays the same.
-
-    Pinocchio reads a tree twice if there are two worlds, and refuses a class that is defined after its use.
-    """
-    worlds = root.findall("worldbody")
-    worlds[-1][:] = [child for world in worlds for child in world]
-    for world in worlds[:-1]:
-        root.remove(world)
 
 
 def _solid(root: Element, shapes: Sequence[Classed]) -> set[Element]:

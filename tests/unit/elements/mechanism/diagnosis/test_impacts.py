@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -41,15 +42,17 @@ def bounces(late: float = 0.0, e: float = 0.5) -> tuple[FloatArray, FloatArray, 
     return t, gap, rate
 
 
-def said(monkeypatch: pytest.MonkeyPatch, t: FloatArray, gap: FloatArray, rate: FloatArray) -> list[str]:
-    """Proven causes of one contact in flight whose restitution is a half."""
-    mechanism = SimpleNamespace(contacts=[SimpleNamespace(restitution=0.5, name="floor")])
+def said(
+    monkeypatch: pytest.MonkeyPatch, t: FloatArray, gap: FloatArray, rate: FloatArray, laws: Sequence[float] = (0.5,)
+) -> list[str]:
+    """Proven causes of contacts in flight, the columns of ``gap``, with these restitutions."""
+    mechanism = SimpleNamespace(contacts=[SimpleNamespace(restitution=e, name=f"foot {e:g}") for e in laws])
     touch = SimpleNamespace(
         mechanism=mechanism,
         time=t,
-        found=SimpleNamespace(gap=gap[:, None]),
-        u_n=rate[:, None],
-        presses=np.zeros((len(t), 1), dtype=bool),
+        found=SimpleNamespace(gap=gap.reshape(len(t), -1)),
+        u_n=rate.reshape(len(t), -1),
+        presses=np.zeros((len(t), len(laws)), dtype=bool),
     )
     monkeypatch.setattr(impacts, "touch_of", lambda _: [touch])
     return [cause.says for cause in impacts.impacts.test(SimpleNamespace(step=STEP)) if cause.proven]
@@ -70,6 +73,18 @@ def test_the_fault_of_an_impact_is_named(
     found = said(monkeypatch, *bounces(late, e))
     assert len(found) == len(words)
     assert all(cause.startswith(word) for cause, word in zip(found, words, strict=True)), found
+
+
+def test_restitutions_of_other_pairs_are_told_for_as_many_pairs_as_feet_have_corners(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of twelve pairs three have each other's restitution: these swaps are named, and equal ones are no swaps."""
+    laws = [*np.linspace(0.3, 0.4, 11).tolist(), 0.4]
+    found = [laws[1], laws[2], laws[0], *laws[3:]]
+    t, *rows = (np.array(rows).T for rows in zip(*(bounces(e=e) for e in found), strict=True))
+    (cause,) = said(monkeypatch, t[:, 0], *rows, laws)
+    swaps = "foot 0.3 has that of foot 0.31; foot 0.31 has that of foot 0.32; foot 0.32 has that of foot 0.3"
+    assert cause == f"restitution is of another pair: {swaps}"
 
 
 @pytest.mark.parametrize("part", [0.3, 0.55, 0.8])
