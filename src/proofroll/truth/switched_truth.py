@@ -275,8 +275,8 @@ def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array, st
 
 
 def _between(tree: ContactTree, route: HybridRoute[ContactMode], path: _Path) -> Routed | None:
-    """Motion and forces of the first route in the middle of each stretch of a path; None: it has none."""
-    lasting = [number for number, stretch in enumerate(path.stretches) if stretch.end > stretch.start]
+    """Motion and forces of the first route in the middle of each stretch of a path that has them; None: it has none."""
+    lasting = [k for k, stretch in enumerate(path.stretches) if stretch.end > stretch.start and not stretch.summed]
     if not lasting:
         return None
     times = np.array([path.stretches[k].middle for k in lasting])

@@ -119,6 +119,7 @@ class ContactWalks(ABC):
         self._signs: tuple[int, ...] = ()
         self._jumping = any(JUMP in names for names in equations.mechanism.kinks.values())
         self._used: dict[str, None] = {}
+        self._rests_in = 0.0  # time until a slip that turns ever faster is over
         symbols = self._symbols()
         self._compiled = (
             None if symbols is None else CompiledModes(symbols, self.contacts, length + 1, self._by_collocation)
@@ -220,13 +221,13 @@ class ContactWalks(ABC):
             raise Refused(REDUNDANT)
         if self._stands(state, mode):
             return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
+        stopping = next((k for k, acting in enumerate(mode) if acting.stops), None)
+        if stopping is not None:
+            return self._stopping(time, state, mode, stopping)
         led = self._led_from_rest(state, mode)
         if any(acting.leads for acting in led):
             with suppress(*([] if led is mode else [Refused])):
                 return self._begun(time, state, led, until)
-        stopping = next((k for k, acting in enumerate(mode) if acting.stops), None)
-        if stopping is not None:
-            return self._stopping(time, state, mode, stopping)
         guards = guards_of(self.contacts, mode)
         share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
         if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
@@ -408,11 +409,24 @@ class ContactWalks(ABC):
         compiled = self.by_symbols(state, mode)
         decay = by_states if compiled is None else compiled.decay_of(mode, k, time)
         guard = guards_of(self.contacts, mode).index(ContactGuard(k, "still"))
+        if self._rests_in:
+            return self._line_to_rest(time, state, mode, guard)
         slip = stopping_slip(time, state, mode, guard, decay, line_of)
         slows = self._solved(slip.line, self._as_it_goes(slip.line, mode)).slide_rate[k]
         sticking = (*mode[:k], mode[k]._replace(kind="stick", stops=False), *mode[k + 1 :])
         last = self._equations.eliminated(slip.last, sticking)
         return replace(slip, last=last, blur=(ROUND_OFF + TOLERANCES[1]) / float(np.linalg.norm(slows)))
+
+    def _line_to_rest(self, time: float, state: Array, mode: ContactMode, guard: int) -> StoppingSlip:
+        """Last instants of a slip that turns ever faster, until all its turns are over: a line to rest."""
+        sticking = tuple(acting._replace(kind="stick", stops=False) if acting.stops else acting for acting in mode)
+        last, duration, self._rests_in = self._equations.eliminated(state, sticking), self._rests_in, 0.0
+        last[-1] = time + duration
+        speed = float(np.abs(last - state)[:-1].max())
+        return StoppingSlip(
+            start=time, end=time + duration, mode=mode, first=state, last=last, guard=guard, line=state,
+            begun=last - state, blur=speed * duration, summed=True,
+        )  # fmt: skip
 
     def _straight_end(self, state: Array, mode: ContactMode, k: int) -> tuple[Array, Array] | None:
         """Changes of a state until a slip stops along one direction, by its first rates and in fact; None: it turns.
