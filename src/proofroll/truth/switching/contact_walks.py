@@ -72,6 +72,7 @@ _NO_PRESSURE = 1e-13  # force of a contact, in natural units, that is round-off 
 _ONE_WAY = 1e-12  # difference of directions in which slips start together
 # Guard of the first instants of a slip, which goes on.
 _GOES_ON = -1
+_INSTANT = 4  # last digits of a time in which nothing moves, as after an event at the end of a run
 _LOOKS = 32  # at the turn of bushings in a step, which is resolved by half as many points
 
 
@@ -219,7 +220,7 @@ class ContactWalks(ABC):
             refuse_jolts(mechanism, time, old_signs[count:], self._signs[count:])
         if not self._equations.mechanism.contacts and self._solved(state, mode).shifts.any():
             raise Refused(REDUNDANT)
-        if self._stands(state, mode):
+        if until - time <= _INSTANT * np.spacing(time) or self._stands(state, mode):
             return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
         stopping = next((k for k, acting in enumerate(mode) if acting.stops), None)
         if stopping is not None:
