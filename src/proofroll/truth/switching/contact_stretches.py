@@ -32,7 +32,12 @@ from proofroll.elements.mechanism.contact.modes import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.rolling_and_spin import moved_by_slip, opened, require_moving, shut_by_pressing
+from proofroll.elements.mechanism.contact.rolling_and_spin import (
+    moved_by_slip,
+    opened,
+    require_moving,
+    shut_by_pressing,
+)
 from proofroll.elements.mechanism.contact.touching import Touching, lying, torn
 from proofroll.elements.mechanism.dynamics.switches import Settling
 from proofroll.elements.mechanism.scene.rotations import Array

@@ -424,7 +424,7 @@ class CompiledMode:
         begun, start = stretch.visited[0]
         states = np.empty((len(times), len(start)))
         early, pars = times <= begun, self._parameters(stretch.mode, stretch.start)
-        left = (begun - times[early]) / ((begun - stretch.start) or 1.0)  # of the line by which a slip gets its direction
+        left = (begun - times[early]) / ((begun - stretch.start) or 1.0)  # of the line in which a slip gets a direction
         states[early] = start + left[:, None] * (stretch.first - start)
         number = int(early.sum())
         for step in stretch.steps:

@@ -257,6 +257,21 @@ def test_a_broken_law_ends_a_truth_and_keeps_what_lies_before(monkeypatch: pytes
         truth(load_scene("double_pendulum"), TIMES)
 
 
+@pytest.mark.parametrize("scene", ["double_pendulum", "oscillators"])
+def test_energy_changes_from_the_start_of_a_scene(scene: str) -> None:
+    """Of samples that begin later it counts from time 0, too, and the check refuses what counts from the first."""
+    element, _, whole = answer(scene)
+    motion = truth_of(element.mechanism, TIMES[8:])
+    later = MechanismTruth._dataset(element, motion, "")
+    name = next(str(name) for name in later.data_vars if str(name) in {"energy_change", "energy_error"})
+    assert later[name].to_numpy() == pytest.approx(whole[name].to_numpy()[8:], abs=1e-12)
+    assert motion.tiles is not None
+    for offset, law in ((0.0, None), (1e-9, "value")):
+        wrong = later.assign({name: later[name].copy(data=later[name].to_numpy() + offset)})
+        first = held_answer(element, wrong, motion.tiles, TIMES[8:]).residuals.first
+        assert (None if first is None else first.law) == law
+
+
 def test_a_bar_is_the_largest_over_the_times() -> None:
     """Forces, whose bars rise and fall, have the largest of all samples, not that of the last."""
     element, motion, _ = answer("slide_to_roll")

@@ -279,7 +279,10 @@ class AnswerCheck:
             published, places = self._of(published, turns, places, rows)
             determinate_reactions(scene, published, residuals)
             works_follow(scene, tiles, turns, places, published, residuals)
-            values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
+            first = BodyPoses(**{name: getattr(tiles, name)[:1, :1] for name in _ARRAYS})
+            first = replace(first, turns=self._turns(turns, tiles.holding(first.time[0])))
+            begun = first.time[0, 0] == 0 and not struck
+            values_follow(scene, published, residuals, first if begun else published.pieces)
             self._forces(published, tiles, places)
         if between is not None:
             time = between.pieces.time[:, 0]

@@ -11,7 +11,7 @@ from proofroll.truth.check.laws.integrals import TO_SERIES
 from proofroll.truth.check.laws.motion import Turns, changed_velocity
 from proofroll.truth.check.laws.record import Array, BodyPoses, PublishedEvent, PublishedValues
 from proofroll.truth.check.laws.residuals import STRUCK, LawResiduals
-from proofroll.truth.check.laws.samples import NOISE, kinetic_energy
+from proofroll.truth.check.laws.samples import NOISE
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiles import Tiles
 from proofroll.truth.check.laws.values import energy_of
@@ -48,7 +48,7 @@ def strikes_follow(
             for (joint, k), coordinates in turns.items():
                 whole[:, 0, joint, k] = coordinates[chosen, point]
             moving = BodyPoses(**arrays, turns=whole)
-            energy, size = energy_of(scene, moving, kinetic_energy(scene, moving))
+            energy, size = energy_of(scene, moving)
             off = values[name][numbers][:, None] - energy
             residuals.note("strike", name, off, size + scene.mass.sum() * scene.speed**2, moving.time, bars[name])
     together = near.sum(0)
