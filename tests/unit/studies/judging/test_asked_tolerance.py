@@ -56,7 +56,7 @@ def test_another_form_is_refused(text: str) -> None:
 @pytest.mark.parametrize("text", ["0", "0 %", "0 mm", "1e400"])
 def test_a_tolerance_of_nothing_is_named_as_it_was_written(text: str) -> None:
     """The one line has the field, what was given and that it lies above 0, whatever unit it was read in."""
-    with pytest.raises(InputError, match=rf"^tolerance = '{text}': write 1e-4 of the path, .* above 0; judged here are"):
+    with pytest.raises(InputError, match=rf"^tolerance = '{text}': write 1e-4 of .* above 0; judged here are"):
         AskedTolerance.of([text], SCENE)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +16,13 @@ from tests.unit.truth.test_work_of_drives import plate_and_ball
 
 from proofroll.core.errors import Refused
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.check.answer import held_answer
+from proofroll.truth.check.answer import _published, held_answer
+from proofroll.truth.check.laws.contacts import slip_of
+from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.error_bars import TwoRouteMotion, cut_motion
 from proofroll.truth.plug_in import MechanismTruth, _unknown_from
 from proofroll.truth.truth_of_mechanism import truth_of
@@ -182,6 +187,37 @@ def test_an_honest_answer_holds_all_laws(scene: str) -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.drill
+@pytest.mark.parametrize("scene", ["cylinder", "sled", "ellipsoid"])
+def test_a_slip_on_a_plane_follows_from_poses_alone(scene: str) -> None:
+    """Of a rim, a ball and an ellipsoid it has the speed that is published, so that its turn is asked for an event."""
+    element, _, dataset = answer(scene) if scene == "sled" else thrown(scene)
+    laws = LawScene(element.mechanism, element.length, element.speed / element.length)
+    pieces = _published(
+        element, {str(name): np.asarray(item.values) for name, item in dataset.variables.items()}
+    ).pieces
+    for k, contact in enumerate(laws.contacts):
+        speeds = dataset["slips"].to_numpy()[:, k]
+        assert speeds.max() > 1e-2 or "touch.2" in contact.name
+        assert np.linalg.norm(slip_of(contact, pieces)[:, 0], axis=-1) == pytest.approx(speeds, abs=1e-12)
+
+
+def thrown(kind: str) -> tuple[MechanismElement, TwoRouteMotion, xr.Dataset]:
+    """A body that turns as it slides on a plane, on its shell or a rim."""
+    keys: Any = (
+        {"axes": (0.1, 0.08, 0.06)} if kind == "ellipsoid" else {"radius": 0.08, "length": 0.04, "axis": (0, 0.6, 0.8)}
+    )
+    lowest = 0.06 if kind == "ellipsoid" else 0.08 * 0.6 + 0.02 * 0.8
+    q0 = (0.0, 0.0, lowest, 1.0, 0.0, 0.0, 0.0)
+    joint = Joint("free", "free", "world", "body", q0=q0, v0=(0.8, 0.3, 0.0, 0.0, 0.0, 1.0))
+    shapes = (Geometry("shell", "body", kind, **keys), Geometry("floor", "world", "plane"))
+    body = Body("body", 1.0, inertia=(0.002, 0.003, 0.004))
+    pair = Pair("touch", ("shell", "floor"), 0.2)
+    mechanism = Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,), gravity=(0.0, 0.0, -9.81))
+    element, motion = MechanismElement(mechanism), truth_of(mechanism, TIMES[:3])
+    return element, motion, MechanismTruth._dataset(element, motion, "")
+
+
 def test_a_hole_in_the_motion_is_refused() -> None:
     """A part of the time that no piece covers breaks a law, though all samples hold the others."""
     element, motion, dataset = answer("double_pendulum")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.check.laws.contacts import slip_of_ball
+from proofroll.truth.check.laws.contacts import slip_of
 from proofroll.truth.check.laws.impacts import held
 from proofroll.truth.check.laws.integrals import cross, integral
 from proofroll.truth.check.laws.joints import law_of, target_of
@@ -111,9 +111,9 @@ def _slips(scene: LawScene, tiles: Tiles) -> list[tuple[str, Array]]:
         if joint.friction
     ]
     of_contacts = [
-        (contact.name, slip_of_ball(contact, tiles), [mode.contacts[k] for mode in tiles.modes])
+        (contact.name, slip_of(contact, tiles), [mode.contacts[k] for mode in tiles.modes])
         for k, contact in enumerate(scene.contacts)
-        if contact.pair.friction and "sphere" in {contact.shape_a.kind, contact.shape_b.kind}
+        if contact.pair.friction and {"plane", "sphere"} & {contact.shape_a.kind, contact.shape_b.kind}
     ]
     slipping = ((name, slip, np.array(modes) == "slip") for name, slip, modes in (*of_joints, *of_contacts))
     return [(name, slip * slips[:, None, None]) for name, slip, slips in slipping]
