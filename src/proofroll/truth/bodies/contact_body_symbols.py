@@ -15,11 +15,11 @@ from proofroll.truth.bodies.maximal_bodies import AXES, BodyInScalars
 from proofroll.truth.bodies.maximal_equations import Switched
 from proofroll.truth.bodies.maximal_taylor import BodySystem
 from proofroll.truth.numerics.elimination import Row
-from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
+from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, turned
 from proofroll.truth.switching.contact_symbols import (
     ScalarTouch,
     SolvedSymbols,
-    TurningMoments,
+    UnknownForces,
     Vector,
     floats,
     kink_guards,
@@ -30,7 +30,6 @@ from proofroll.truth.switching.contact_symbols import (
     opposed_rates,
     resisted,
     resisted_rate,
-    rows_of,
     scalar_motion,
     touch_in_scalars,
     worth_compiling,
@@ -101,41 +100,25 @@ class BodySymbols:
         instant = instant._replace(pressing=[touch for _, touch in turns])
         joints = [motion.rows[k] for k in self._kept]
         lines = self._lines(began, mode, touching, instant, BodySystem(e, motion, joints), functions)
-        rows, aims, force = list[tuple[Row, Row]](), list[Scalar](), list(motion.force)
-        owner: list[tuple[int, Vector]] = []
-        contacts, root = self._equations.contacts, functions["sqrt"]
-        turning = TurningMoments(mode, contacts, touching, lines, root)
+        contacts, force = self._equations.contacts, list(motion.force)
+        for k, (acting, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
+            if line is not None and acting.kind == "slip" and (bound := float(self._equations.bounds[k])):
+                for n, value in self._row(k, touch, scaled(-bound, line), instant).items():
+                    force[n] = add(force[n], value)
 
         def row_of(k: int, direction: Vector) -> Row:
             return self._row(k, touching[k], direction, instant)
 
-        for k, (acting, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
-            if acting.kind == "open":
-                continue
-            part = rows_of(acting.kind, touch, line, contacts[k], root)
-            rate = self._bias(k, touch, instant)
-            if line is not None and acting.kind == "slip" and (bound := float(self._equations.bounds[k])):
-                for n, value in self._row(k, touch, scaled(-bound, line), instant).items():
-                    force[n] = add(force[n], value)
-            for direction, push in zip(part.directions, part.along, strict=True):
-                row = self._row(k, touch, direction, instant)
-                pushed = row if push is direction else self._row(k, touch, push, instant)
-                rows.append((row, turning.pushed(pushed, len(owner), k, push, row_of)))
-                beyond = dot(touch.normal_rate, touch.slide) if acting.kind == "slip" else 0.0
-                aims.append(sub(sub(0.0, dot(direction, rate)), beyond))
-                owner.append((k, push))
-        accelerations, multipliers, sizes, pivots = BodySystem(e, motion, joints, rows).accelerated(force, aims)
+        unknown = UnknownForces(
+            mode, contacts, touching, lines, functions["sqrt"], row_of, lambda k: self._bias(k, touching[k], instant)
+        )
+        system = BodySystem(e, motion, joints, list(zip(unknown.rows, unknown.pushes, strict=True)))
+        accelerations, multipliers, sizes, pivots = system.accelerated(force, unknown.aims)
         response: Scalar = 1.0
         if any(acting.kind == "slip" and mu for acting, mu in zip(mode, self._equations.friction, strict=True)):
-            smooth = BodySystem(e, motion, joints, [(row, row) for row, _ in rows]).pivots()
+            smooth = BodySystem(e, motion, joints, [(row, row) for row in unknown.rows]).pivots()
             for pivot, smooth_pivot in zip(pivots, smooth, strict=True):
                 response = mul(response, pivot / smooth_pivot)
-        forces: list[Vector | None] = [None if acting.kind == "open" else [0.0, 0.0, 0.0] for acting in mode]
-        for (k, push), size in zip(owner, sizes, strict=True):
-            own_force = forces[k]
-            assert own_force is not None  # its owner is closed
-            forces[k] = plus(own_force, scaled(size, push))
-        turning.add_to(forces, sizes)
         moved = [
             plus(self._moved(k, touch, accelerations, instant), self._bias(k, touch, instant))
             for k, touch in enumerate(touching)
@@ -144,7 +127,7 @@ class BodySymbols:
             rates=[*motion.rate, *accelerations, *motion.angle_rate],
             touching=touching,
             lines=lines,
-            forces=forces,
+            forces=unknown.forces(sizes),
             response=response,
             slide_rates=opposed_rates(contacts, touching, moved),
             within_limits=limits,

@@ -302,8 +302,15 @@ def opposed_rates(
     return whole
 
 
-class TurningMoments:
-    """Moments of friction against turning that the normal forces of contacts bring."""
+class UnknownForces:
+    """Unknown forces of closed contacts, with the moments of friction against turning that their normal parts bring.
+
+    Attributes:
+        rows: coefficients, along the velocities, of the slide in the direction that each has to hold.
+        pushes: loads by a unit of each.
+        aims: rates of these slides that accelerations have to give.
+        owner: contact and direction of each.
+    """
 
     def __init__(
         self,
@@ -312,35 +319,48 @@ class TurningMoments:
         touching: Sequence[ScalarTouch],
         lines: Sequence[Vector | None],
         root: Callable[[Scalar], Scalar],
+        row_of: Callable[[int, Vector], Row],
+        bias_of: Callable[[int], Vector],
     ) -> None:
-        self._touching, self._found = touching, list[tuple[int, int, Vector]]()
-        self._acting: list[tuple[int, int, Vector]] = []  # friction, what presses, moment by a unit normal force
-        for k, (acting, contact, touch, line) in enumerate(zip(mode, contacts, touching, lines, strict=True)):
-            if acting.kind != "slip" or contact.pressed_by is None:
-                continue
-            slip = touch.across(touch.slide)
-            way = scaled(1.0 / root(dot(slip, slip)), slip) if line is None else line
-            self._acting.append((k, contact.pressed_by, scaled(-float(contact.friction), way)))
+        """Takes coefficients of a contact's slide in a direction, and its rate while the velocities stay."""
+        self._mode, self._touching, self._row_of = mode, touching, row_of
+        self._acting = list[tuple[int, int, Vector]]()  # friction, what presses, moment by a unit normal force
+        self._found = list[tuple[int, int, Vector]]()
+        self.rows, self.pushes, self.aims = list[Row](), list[Row](), list[Scalar]()
+        self.owner = list[tuple[int, Vector]]()
+        closed = [
+            item for item in enumerate(zip(mode, contacts, touching, lines, strict=True)) if item[1][0].kind != "open"
+        ]
+        for k, (acting, contact, touch, line) in closed:
+            if acting.kind == "slip" and contact.pressed_by is not None:
+                slip = touch.across(touch.slide)
+                way = scaled(1.0 / root(dot(slip, slip)), slip) if line is None else line
+                self._acting.append((k, contact.pressed_by, scaled(-float(contact.friction), way)))
+        for k, (acting, contact, touch, line) in closed:
+            part, bias = rows_of(acting.kind, touch, line, contact, root), bias_of(k)
+            beyond = dot(touch.normal_rate, touch.slide) if acting.kind == "slip" else 0.0
+            for direction, push in zip(part.directions, part.along, strict=True):
+                row = row_of(k, direction)
+                self.rows.append(row)
+                self.pushes.append(self._pushed(row if push is direction else row_of(k, push), k, push))
+                self.aims.append(sub(sub(0.0, dot(direction, bias)), beyond))
+                self.owner.append((k, push))
 
-    def pushed(self, push: Row, place: int, k: int, direction: Vector, row_of: Callable[[int, Vector], Row]) -> Row:
-        """Loads by a unit of an unknown force, with those of the moments that it brings.
-
-        Args:
-            push: loads of the force alone.
-            place: of the force among all unknown ones.
-            k: its contact.
-            direction: its direction.
-            row_of: coefficients of a contact's slide in a direction.
-        """
+    def _pushed(self, push: Row, k: int, direction: Vector) -> Row:
+        """Loads by a unit of the next force, of a contact in a direction, with those of the moments that it brings."""
         for number, by, moment in self._acting:
             if by == k:
                 carried = scaled(dot(self._touching[k].normal, direction), moment)
-                self._found.append((place, number, carried))
-                brought = row_of(number, carried)
+                self._found.append((len(self.owner), number, carried))
+                brought = self._row_of(number, carried)
                 push = {n: add(push.get(n, 0.0), brought.get(n, 0.0)) for n in (push | brought)}
         return push
 
-    def add_to(self, forces: list[Vector | None], sizes: Sequence[Scalar]) -> None:
-        """Adds the moments to the forces of all contacts, from the sizes of the unknown ones."""
-        for place, k, moment in self._found:
-            forces[k] = plus(forces[k] or _NONE, scaled(sizes[place], moment))
+    def forces(self, sizes: Sequence[Scalar]) -> list[Vector | None]:
+        """Forces and moments of all contacts, from the sizes of the unknown ones; None: open."""
+        forces: list[Vector | None] = [None if acting.kind == "open" else [0.0, 0.0, 0.0] for acting in self._mode]
+        parts = [(k, scaled(size, push)) for (k, push), size in zip(self.owner, sizes, strict=True)]
+        parts += [(k, scaled(sizes[place], moment)) for place, k, moment in self._found]
+        for k, part in parts:
+            forces[k] = plus(forces[k] or _NONE, part)
+        return forces

@@ -44,7 +44,7 @@ from proofroll.truth.switching.contact_stretches import ContactStretches
 from proofroll.truth.switching.contact_symbols import (
     ScalarTouch,
     SolvedSymbols,
-    TurningMoments,
+    UnknownForces,
     Vector,
     floats,
     kink_guards,
@@ -55,7 +55,6 @@ from proofroll.truth.switching.contact_symbols import (
     opposed_rates,
     resisted,
     resisted_rate,
-    rows_of,
     scalar_motion,
     touch_in_scalars,
     worth_compiling,
@@ -122,30 +121,17 @@ class TreeSymbols:
                 for n, value in _along(slides[k][0], scaled(-bound, start)).items():
                     load[n] = add(load[n], value)
         free, lines = self._lines(mode, began, mass, load, touching, slides, functions)
-        rows: list[Row] = []
-        aims: list[Scalar] = []
-        pushes: list[Row] = []
-        owner: list[tuple[int, Vector]] = []
-        contacts, root = self._dynamics.contacts, functions["sqrt"]
-        turning = TurningMoments(mode, contacts, touching, lines, root)
+        contacts = self._dynamics.contacts
 
         def row_of(k: int, direction: Vector) -> Row:
             return _along(slides[k][0], direction)
 
-        for k, (action, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
-            if action.kind == "open":
-                continue
-            part = rows_of(action.kind, touch, line, contacts[k], root)
-            beyond = dot(touch.normal_rate, touch.slide) if action.kind == "slip" else 0.0
-            for direction, force_direction in zip(part.directions, part.along, strict=True):
-                rows.append(_along(slides[k][0], direction))
-                pushes.append(turning.pushed(row_of(k, force_direction), len(owner), k, force_direction, row_of))
-                aims.append(sub(sub(0.0, dot(direction, slides[k][1])), beyond))
-                owner.append((k, force_direction))
-        responses, _ = eliminated(mass, [self._free(push) for push in pushes])
+        unknown = UnknownForces(mode, contacts, touching, lines, functions["sqrt"], row_of, lambda k: slides[k][1])
+        rows = unknown.rows
+        responses, _ = eliminated(mass, [self._free(push) for push in unknown.pushes])
         acting = [_applied(rows, response) for response in responses]
         system: list[Row] = [{j: column[i] for j, column in enumerate(acting)} for i in range(len(rows))]
-        right = [sub(aim, value) for aim, value in zip(aims, _applied(rows, free), strict=True)]
+        right = [sub(aim, value) for aim, value in zip(unknown.aims, _applied(rows, free), strict=True)]
         (sizes,), pivots = eliminated(system, [right])
         response: Scalar = 1.0
         if any(action.kind == "slip" and mu for action, mu in zip(mode, self._dynamics.friction, strict=True)):
@@ -154,14 +140,9 @@ class TreeSymbols:
             _, others = eliminated([{j: column[i] for j, column in enumerate(smooth)} for i in range(len(rows))], [])
             for pivot, smooth_pivot in zip(pivots, others, strict=True):
                 response = mul(response, pivot / smooth_pivot)
-        forces: list[Vector | None] = [None if action.kind == "open" else [0.0, 0.0, 0.0] for action in mode]
-        moved = list(free)
-        for (k, force_direction), size, column in zip(owner, sizes, responses, strict=True):
-            force = forces[k]
-            assert force is not None  # its owner is closed
-            forces[k] = plus(force, scaled(size, force_direction))
+        forces, moved = unknown.forces(sizes), list(free)
+        for size, column in zip(sizes, responses, strict=True):
             moved = plus(moved, scaled(size, column))
-        turning.add_to(forces, sizes)
         slide_rates = [plus(_moved(J, moved), bias) for J, bias in slides]
         drives = []
         for n, row, loaded in inertial.driven:
