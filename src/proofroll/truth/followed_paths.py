@@ -103,9 +103,7 @@ def cut_early(
         PACE.leave()
 
 
-def in_one_mode(
-    path: FollowedPath, early: FollowedPath, times: Array, kinds: Callable[[Any], Any]
-) -> NDArray[np.bool_]:
+def in_one_mode(path: FollowedPath, early: FollowedPath, times: Array, kinds: Callable[..., Any]) -> NDArray[np.bool_]:
     """True at times at which a path that cuts rebounds early is known, in the mode of the path."""
     modes = zip(
         *([kinds(item.stretches[k].mode) for k in item.stretch_at(times)] for item in (path, early)), strict=True

@@ -17,7 +17,7 @@ from proofroll.core.events import IMPACTS, JUMPS, Event, EventKind
 from proofroll.core.pace import PACE
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
-from proofroll.elements.mechanism.contact.modes import REST, Acting, ContactMode
+from proofroll.elements.mechanism.contact.modes import REST, ContactMode
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
@@ -221,13 +221,12 @@ def _works_known(tree: ContactTree, path: _Path) -> Array:
 def _kinds(dynamics: ContactDynamics, mode: ContactMode) -> tuple[tuple[str, bool], ...]:
     """Part of a mode in which both routes must agree: kinds, and the sense of a joint that slides against friction."""
     return tuple(
-        (acting.kind, isinstance(law, JointContact) and acting.kind == "slip" and _rises(acting))
+        (
+            acting.kind,
+            isinstance(law, JointContact) and acting.kind == "slip" and bool(acting.along and acting.along[1] > 0),
+        )
         for acting, law in zip(mode, dynamics.contacts, strict=True)
     )
-
-
-def _rises(acting: Acting) -> bool:
-    return acting.along is not None and acting.along[1] > 0
 
 
 def _names(tree: ContactTree, bodies: ContactBodies) -> tuple[str, str]:

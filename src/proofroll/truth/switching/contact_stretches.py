@@ -32,12 +32,7 @@ from proofroll.elements.mechanism.contact.modes import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.rolling_and_spin import (
-    moved_by_slip,
-    opened,
-    require_moving,
-    shut_by_pressing,
-)
+from proofroll.elements.mechanism.contact.rolling_and_spin import led_by_slip, opened, require_moving, shut_by_pressing
 from proofroll.elements.mechanism.contact.touching import Touching, lying, torn
 from proofroll.elements.mechanism.dynamics.switches import Settling
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -432,8 +427,8 @@ class ContactStretches(ContactWalks):
         if stretch.mode[k].along is None and not isinstance(stretch, BegunSlip | StoppingSlip):
             ending = stretch.mode[k]._replace(stops=True)
             return Transition(stretch.last, (*stretch.mode[:k], ending, *stretch.mode[k + 1 :]), ())
-        if not stretch.summed and (turned := self._turned_to_rest(stretch, k)):
-            mode = tuple(acting._replace(stops=j in {k, *turned}) for j, acting in enumerate(stretch.mode))
+        if not stretch.summed and (rocked := self._rocked_to_rest(stretch, k)):
+            mode = tuple(acting._replace(stops=j in rocked) for j, acting in enumerate(stretch.mode))
             return Transition(stretch.last, mode, ((EventKind.TURN, self.contacts[k].name),))
         closed_mask, solved = closed_in(stretch.mode), self._solved(stretch.last, stretch.mode)
         slides = [k for k, acting in enumerate(stretch.mode) if acting.kind == "slip"]
@@ -444,20 +439,19 @@ class ContactStretches(ContactWalks):
                 return replace(ended, blur=float((slips / np.linalg.norm(solved.slide_rate[slides], axis=1)).max()))
         return self._after(stretch, stretch.last, closed_mask, ())
 
-    def _turned_to_rest(self, stretch: Stretch[ContactMode], k: int) -> list[int]:
-        """Resistances against motion of a contact whose slip turns ever faster, and that rest when it does.
+    def _rocked_to_rest(self, stretch: Stretch[ContactMode], k: int) -> set[int]:
+        """A contact whose slip turns ever faster, and its resistance against motion, if they rest when that is over.
 
         With an arm longer than that of friction a ball goes to and fro: its speed falls by the same part each time.
         """
-        turning = [j for j, c in enumerate(self.contacts) if c.pressed_by == k and moved_by_slip(c, stretch.mode)]
-        for j in turning:
-            slide = self._touching(stretch.last, features_of(stretch.mode))[j].slide
-            turn = Impact(stretch.end, frozenset({j}), float(np.linalg.norm(slide)))
-            series = self._series.after(self.contacts[j].pair, turn)
-            if series is not None and turn.speed <= _LAST_TURN:
-                self._rests_in = series.remaining
-                return turning
-        return []
+        for j, contact in enumerate(self.contacts):
+            if contact.pressed_by == k and led_by_slip(contact, stretch.mode):
+                speed = float(np.linalg.norm(self._touching(stretch.last, features_of(stretch.mode))[j].slide))
+                series = self._series.after(contact.pair, Impact(stretch.end, frozenset({j}), speed))
+                if series is not None and speed <= _LAST_TURN:
+                    self._rests_in = series.remaining
+                    return {j, k}
+        return set()
 
     def _after(
         self,

@@ -388,7 +388,7 @@ class ContactWalks(ABC):
         return tuple(headed(acting, touch) for acting, touch in zip(mode, touching, strict=True))
 
     def _stopping(self, time: float, state: Array, mode: ContactMode, k: int) -> StoppingSlip:
-        """Last instants of a slip below FAINT.
+        """Last instants of a slip below FAINT, or of one that turns ever faster, until all its turns are over.
 
         The duration of its straight line, with that of the error of the speed, is the uncertainty of the end.
         """
@@ -405,29 +405,22 @@ class ContactWalks(ABC):
             return np.array(speeds), np.array(changes).T
 
         def line_of(y: Array) -> tuple[Array, Array] | None:
-            return self._straight_end(y, self._as_it_goes(y, mode), k)
+            if not rests_in:
+                return self._straight_end(y, self._as_it_goes(y, mode), k)
+            change = np.append((self._equations.eliminated(y, sticking) - y)[:-1], rests_in)
+            return change, change
+
+        rests_in, self._rests_in = self._rests_in, 0.0
+        sticking = tuple(acting._replace(kind="stick", stops=False) if acting.stops else acting for acting in mode)
 
         compiled = self.by_symbols(state, mode)
         decay = by_states if compiled is None else compiled.decay_of(mode, k, time)
         guard = guards_of(self.contacts, mode).index(ContactGuard(k, "still"))
-        if self._rests_in:
-            return self._line_to_rest(time, state, mode, guard)
         slip = stopping_slip(time, state, mode, guard, decay, line_of)
         slows = self._solved(slip.line, self._as_it_goes(slip.line, mode)).slide_rate[k]
-        sticking = (*mode[:k], mode[k]._replace(kind="stick", stops=False), *mode[k + 1 :])
         last = self._equations.eliminated(slip.last, sticking)
-        return replace(slip, last=last, blur=(ROUND_OFF + TOLERANCES[1]) / float(np.linalg.norm(slows)))
-
-    def _line_to_rest(self, time: float, state: Array, mode: ContactMode, guard: int) -> StoppingSlip:
-        """Last instants of a slip that turns ever faster, until all its turns are over: a line to rest."""
-        sticking = tuple(acting._replace(kind="stick", stops=False) if acting.stops else acting for acting in mode)
-        last, duration, self._rests_in = self._equations.eliminated(state, sticking), self._rests_in, 0.0
-        last[-1] = time + duration
-        speed = float(np.abs(last - state)[:-1].max())
-        return StoppingSlip(
-            start=time, end=time + duration, mode=mode, first=state, last=last, guard=guard, line=state,
-            begun=last - state, blur=speed * duration, summed=True,
-        )  # fmt: skip
+        blur = (ROUND_OFF + TOLERANCES[1]) / float(np.linalg.norm(slows))
+        return replace(slip, last=last, blur=blur, summed=rests_in > 0)
 
     def _straight_end(self, state: Array, mode: ContactMode, k: int) -> tuple[Array, Array] | None:
         """Changes of a state until a slip stops along one direction, by its first rates and in fact; None: it turns.

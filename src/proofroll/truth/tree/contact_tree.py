@@ -50,6 +50,7 @@ from proofroll.truth.switching.contact_symbols import (
     kink_guards,
     known_shapes,
     limited,
+    lines_of,
     of_joint,
     of_turning,
     opposed_rates,
@@ -120,13 +121,18 @@ class TreeSymbols:
             if start is not None and mode[k].kind == "slip" and bound:  # dry friction, which is as large as it can be
                 for n, value in _along(slides[k][0], scaled(-bound, start)).items():
                     load[n] = add(load[n], value)
-        free, lines = self._lines(mode, began, mass, load, touching, slides, functions)
-        contacts = self._dynamics.contacts
+        (free,), _ = eliminated(mass, [load])
+        contacts, root = self._dynamics.contacts, functions["sqrt"]
 
         def row_of(k: int, direction: Vector) -> Row:
             return _along(slides[k][0], direction)
 
-        unknown = UnknownForces(mode, contacts, touching, lines, functions["sqrt"], row_of, lambda k: slides[k][1])
+        def responses_of(pushes: list[tuple[int, Vector]]) -> list[Vector]:
+            answers, _ = eliminated(mass, [self._free(row_of(k, push)) for k, push in pushes])
+            return [_moved(slides[k][0], answer) for (k, _), answer in zip(pushes, answers, strict=True)]
+
+        lines = lines_of(mode, contacts, touching, began, responses_of, root)
+        unknown = UnknownForces(mode, contacts, touching, lines, root, row_of, lambda k: slides[k][1])
         rows = unknown.rows
         responses, _ = eliminated(mass, [self._free(push) for push in unknown.pushes])
         acting = [_applied(rows, response) for response in responses]
@@ -187,33 +193,6 @@ class TreeSymbols:
             touching.append(of_joint(contact, q[contact.joint.coordinate], v[n]))
             slides.append(({n: floats(contact.direction)}, _NONE))
         return touching, slides
-
-    def _lines(
-        self,
-        mode: ContactMode,
-        began: Sequence[Vector | None],
-        mass: list[Row],
-        load: list[Scalar],
-        touching: Sequence[ScalarTouch],
-        slides: Sequence[tuple[dict[int, Vector], Vector]],
-        functions: Any,
-    ) -> tuple[list[Scalar], list[Vector | None]]:
-        """Accelerations without contact forces, and present directions of lines: where a force across would move.
-
-        Those of joints never turn, and those of contacts that lead are given.
-        """
-        lines, starts = list(began), enumerate(zip(self._dynamics.contacts, began, mode, strict=True))
-        turning = {
-            k: start
-            for k, (contact, start, acting) in starts
-            if start is not None and not acting.leads and not isinstance(contact, JointContact)
-        }
-        pushes = [self._free(_along(slides[k][0], touching[k].across(start))) for k, start in turning.items()]
-        (free, *answers), _ = eliminated(mass, [load, *pushes])
-        for k, answer in zip(turning, answers, strict=True):
-            way = touching[k].across(_moved(slides[k][0], answer))
-            lines[k] = scaled(1.0 / functions["sqrt"](dot(way, way)), way)
-        return free, lines
 
     def _inertial(
         self,

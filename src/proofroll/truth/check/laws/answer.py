@@ -279,8 +279,7 @@ class AnswerCheck:
             published, places = self._of(published, turns, places, rows)
             determinate_reactions(scene, published, residuals)
             works_follow(scene, tiles, turns, places, published, residuals)
-            first = BodyPoses(**{name: getattr(tiles, name)[:1, :1] for name in _ARRAYS})
-            first = replace(first, turns=self._turns(turns, tiles.holding(first.time[0])))
+            first = tiles.at(np.ix_([0], [0]), self._turns(turns, tiles.holding(tiles.time[0, :1])))
             begun = first.time[0, 0] == 0 and not struck
             values_follow(scene, published, residuals, first if begun else published.pieces)
             self._forces(published, tiles, places)
@@ -354,7 +353,6 @@ class AnswerCheck:
         return np.asarray(np.abs(time * control.rate - np.round(time * control.rate)) < _INSTANT)
 
 
-_ARRAYS = ("time", "pace", "p", "R", "v", "w")
 _RANK = 1e-11  # singular value, relative to the largest, below which reactions are not independent
 _FIXED, _FREE = 1e-9, 1e-4  # change of a component, relative to the largest, that is none, and that is one
 
@@ -366,8 +364,7 @@ def determinate_reactions(scene: LawScene, published: PublishedValues, residuals
     if scene.contacts or not (unknown.any() or m.loops):
         return
     for row in {0, last // 2, last}:
-        poses = BodyPoses(**{name: getattr(published.pieces, name)[[row]] for name in _ARRAYS})
-        most = np.maximum(most, _changes(scene, poses))
+        most = np.maximum(most, _changes(scene, published.pieces.at([row])))
     # drives and couplings have reactions of their own, by which further components may change
     passive = not m.couplings and all(joint.motion is None for joint in m.joints)
     wrong = np.where(unknown, (most < _FIXED) & passive, (most > _FREE) & np.isfinite(wrenches).all(0))
