@@ -15,10 +15,12 @@ from tests.unit.truth.test_work_of_drives import TIMES as LIFTED
 from tests.unit.truth.test_work_of_drives import plate_and_ball
 
 from proofroll.core.errors import Refused
+from proofroll.core.events import events_of
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
 from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.check.answer import _published, held_answer
 from proofroll.truth.check.laws.contacts import slip_of
@@ -216,6 +218,23 @@ def thrown(kind: str) -> tuple[MechanismElement, TwoRouteMotion, xr.Dataset]:
     mechanism = Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,), gravity=(0.0, 0.0, -9.81))
     element, motion = MechanismElement(mechanism), truth_of(mechanism, TIMES[:3])
     return element, motion, MechanismTruth._dataset(element, motion, "")
+
+
+@pytest.mark.drill
+def test_an_impact_at_the_start_is_no_change_without_a_motion_before_it() -> None:
+    """A ball that rests on a plate that rises from time 0 on is struck there, and its answer holds all laws."""
+    bodies = Body("ball", 1.0, inertia=(0.004,) * 3), Body("plate", 1.0, inertia=(0.01,) * 3)
+    joints = (
+        Joint("free", "free", "world", "ball", q0=(0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)),
+        Joint("rises", "prismatic", "world", "plate", axis=(0.0, 0.0, 1.0), motion=Formula("0.3*t")),
+    )
+    shapes = (Geometry("skin", "ball", "sphere", radius=0.1), Geometry("floor", "plate", "plane"))
+    pairs = (Pair("touch", ("skin", "floor"), 0.2),)
+    mechanism = Mechanism(bodies, joints, geometries=shapes, pairs=pairs, gravity=(0.0, 0.0, -9.81))
+    true = MechanismTruth.truth(MechanismElement(mechanism), TIMES[:3], ())
+    assert "ended" not in true.attrs
+    assert [(event.kind, event.time_low <= 0) for event in events_of(true)] == [("impact", True)]
+    assert true["v_WB"].to_numpy()[:, 0, 2] == pytest.approx([0.3] * 3, abs=1e-13)
 
 
 def test_a_hole_in_the_motion_is_refused() -> None:

@@ -69,7 +69,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
         apart = np.append(apart, abs(item.time) if item.time <= 0 else np.inf)
         off = max(min(float(apart.min()), 1 + item.time), item.low - item.time, item.time - item.high)
         residuals.note("change", item.name, np.array([[off]]), 1 + abs(item.time), np.array([[item.time]]))
-        if item.strikes and item.name in contacts and item not in hits:
+        if item.strikes and item.low > 0 and item.name in contacts and item not in hits:
             residuals.note("change", item.name, np.ones((1, 1)), 1.0, np.array([[item.time]]))
 
 
