@@ -313,7 +313,7 @@ def test_a_broken_law_ends_a_truth_and_keeps_what_lies_before(monkeypatch: pytes
         truth(load_scene("double_pendulum"), TIMES)
 
 
-@pytest.mark.parametrize("scene", ["double_pendulum", "oscillators"])
+@pytest.mark.parametrize("scene", ["double_pendulum", pytest.param("oscillators", marks=pytest.mark.drill)])
 def test_energy_changes_from_the_start_of_a_scene(scene: str) -> None:
     """Of samples that begin later it counts from time 0, too, and the check refuses what counts from the first."""
     element, _, whole = answer(scene)
