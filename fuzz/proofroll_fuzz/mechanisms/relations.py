@@ -72,8 +72,11 @@ def _reorder(tables: dict[str, Any], _: object) -> None:
             tables[name] = content[::-1]
 
 
-def _reordered_back(truth: Mapping[Any, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
-    order = [truth["body"].to_numpy().tolist().index(row["name"]) for row in tables["bodies"]]
+def _of_bodies(truth: Mapping[Any, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Coordinates, and places and velocities of the bodies of a scene file, then of those inside its joints."""
+    names = truth["body"].to_numpy().tolist()
+    order = [names.index(row["name"]) for row in tables["bodies"]]
+    order += [k for row in tables["joints"] for k, name in enumerate(names) if name.startswith(f"{row['name']}.")]
     return _coordinates(truth) | {name: truth[name].to_numpy()[:, order] for name in ("p_WB", "v_WB")}
 
 
@@ -112,15 +115,10 @@ def _weld(tables: dict[str, Any], _: object) -> None:
     tables["bodies"] += halves
 
 
-def _unwelded(truth: Mapping[Any, Any], tables: Mapping[str, Any]) -> dict[str, Any]:
-    count = len(tables["bodies"])
-    return _coordinates(truth) | {name: truth[name].to_numpy()[:, :count] for name in ("p_WB", "v_WB")}
-
-
 RELATIONS: Mapping[str, Relation] = {
     "turned": Relation(_turn, _turned_back),
     "renamed": Relation(_rename, _renamed_back),
-    "reordered": Relation(_reorder, _reordered_back),
+    "reordered": Relation(_reorder, _of_bodies),
     "reversed": Relation(_reverse, _reversed_back),
-    "welded": Relation(_weld, _unwelded),
+    "welded": Relation(_weld, _of_bodies),
 }

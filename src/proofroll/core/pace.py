@@ -13,7 +13,7 @@ _TELLING = 0.01  # part of a route from which its pace is told: the first steps 
 AT = "truth at "  # beginning of a line that a worker prints about it
 # Route, or check -> part of the limit that is used when it ends; then motions are sampled. Where nothing switches both
 # are followed again from a start beside. A closed form is checked about as long as its witness takes.
-_ROUTES = {"first": 0.4, "second": 0.8, "laws": 0.9, "steps": 1.0, "witness": 0.5}
+_ROUTES = {"first": 0.4, "second": 0.8, "laws": 0.9, "early": 0.95, "steps": 1.0, "witness": 0.5}
 _SMOOTH = 0.6875
 # Processor time of a sample [s] that all but the dearest need; number of samples by which a time is foretold.
 _SAMPLE, _FEW = 0.1, 16
@@ -64,7 +64,7 @@ class Pace:
         """Begins a route, or a check, to an end in its own unit of time.
 
         ``route``: ``first`` or ``second``, or the only one by ``steps``; the check of ``laws``; the ``witness`` of a
-        closed form. ``smooth``: nothing switches.
+        closed form; the first route with its rebounds cut ``early``. ``smooth``: nothing switches.
         """
         self._route, self._begun, self._end = route, (time.process_time(), -1.0), end
         self._part = _ROUTES[route] * (_SMOOTH if smooth else 1.0)
@@ -95,12 +95,12 @@ class Pace:
         """Records the time that a route has reached, in its own unit.
 
         Raises:
-            OutOfTime: the limit is used.
+            OutOfTime: the limit is used, and the route has begun.
         """
         if not self._route:
             return
         used, part = time.process_time(), t / self._end
-        if used - self._began > self._part * self._limit:
+        if t > 0 and used - self._began > self._part * self._limit:
             self.over = True
             raise OutOfTime(self.reason, t)
         if self._begun[1] < 0:  # what came before, like compiling, says nothing of the pace

@@ -88,24 +88,28 @@ def followed(
 
 
 def cut_early(
-    route: HybridRoute[ModeT],
-    path: HybridPath[Stretch[ModeT]],
-    until: float,
-    kinks: Sequence[float],
-    times: Array,
-    kinds: Callable[[Any], Any] = lambda mode: mode,
-) -> tuple[HybridPath[Stretch[ModeT]], NDArray[np.bool_]] | None:
-    """Path of a ``route`` that cuts infinitely many rebounds early, and at which times it has the mode of the path.
+    route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], until: float, kinks: Sequence[float]
+) -> HybridPath[Stretch[ModeT]] | None:
+    """Path of a ``route`` that cuts infinitely many rebounds early; None: the path has none.
 
     The error of a cut is quadratic in its speed, so that of the path itself is at most a third of their difference.
-    None: no rebounds were cut.
     """
     if not any(item.kind == EventKind.SETTLE for item in path.happenings):
         return None
-    early = follow(route, until, kinks, CLOSE)
-    modes = ([kinds(item.stretches[k].mode) for k in item.stretch_at(times)] for item in (path, early))
-    alike = np.array([mode_of_path == early_mode for mode_of_path, early_mode in zip(*modes, strict=True)])
-    return early, alike & (early.known | (times < early.stretches[-1].end))
+    try:
+        PACE.follow("early", until)
+        return follow(route, until, kinks, CLOSE)
+    finally:
+        PACE.leave()
+
+
+def in_one_mode(path: FollowedPath, early: FollowedPath, times: Array, kinds: Callable[..., Any]) -> NDArray[np.bool_]:
+    """True at times at which a path that cuts rebounds early is known, in the mode of the path."""
+    modes = zip(
+        *([kinds(item.stretches[k].mode) for k in item.stretch_at(times)] for item in (path, early)), strict=True
+    )
+    alike = np.array([mode_of_path == early_mode for mode_of_path, early_mode in modes])
+    return np.asarray(alike & (early.known | (times < early.stretches[-1].end)))
 
 
 def end_of(paths: tuple[FollowedPath, FollowedPath]) -> tuple[float, str]:

@@ -17,7 +17,7 @@ from proofroll.core.events import IMPACTS, JUMPS, Event, EventKind
 from proofroll.core.pace import PACE
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contact.joint_laws import JointContact
-from proofroll.elements.mechanism.contact.modes import REST, Acting, ContactMode
+from proofroll.elements.mechanism.contact.modes import REST, ContactMode
 from proofroll.elements.mechanism.contact.tree_contacts import ContactDynamics
 from proofroll.elements.mechanism.dynamics.held_signals import has_held
 from proofroll.elements.mechanism.dynamics.link_forces import working, working_joints
@@ -41,6 +41,7 @@ from proofroll.truth.followed_paths import (
     counterparts,
     cut_early,
     followed,
+    in_one_mode,
     refuse_uncovered,
     stretches_at,
     times_known,
@@ -100,9 +101,13 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
     ]
     outcome = held_to_laws(mechanism, units, of_routes)
     if np.isfinite(outcome.end):
-        paths = cut_at(paths[0], outcome.end, outcome.text), cut_at(paths[1], outcome.end, outcome.text)
+        paths = _cut(paths, outcome.end, outcome.text)
     reason = _reason(dynamics, paths)
     asked = times_known(paths, times, reason)
+    early = None if held_paths else cut_early(tree.early(), paths[0], float(asked[-1]), breaking)
+    if early is not None and early.ended and early.ended == PACE.reason:  # bars would leave out the errors of sums
+        paths = _cut(paths, early.stretches[-1].end, PACE.reason)
+        asked = times_known(paths, times, reason)
     times = held_paths[1].on_instants(held_paths[0].on_instants(asked)) if held_paths else asked
 
     def sampled(times: Array) -> tuple[list[int], list[int], Routed, Routed]:
@@ -116,24 +121,25 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
 
     count = PACE.fitting(times, sampled)
     if count < len(times):
-        paths = cut_at(paths[0], float(times[count]), PACE.reason), cut_at(paths[1], float(times[count]), PACE.reason)
+        paths = _cut(paths, float(times[count]), PACE.reason)
     times, asked = times[:count], asked[:count]
     stretches, others, by_tree, by_bodies = sampled(times)
     seconds, known_until = times * units.time, _works_known(tree, paths[0])
-    at_samples = zip(outcome.works, (stretches, others), strict=True)
-    (work_of_tree, *rest_of_tree), (work_of_bodies, *rest) = (work.at(seconds, numbers) for work, numbers in at_samples)
+    (work_of_tree, *rest_of_tree), (work_of_bodies, *rest) = (
+        work.at(seconds, numbers) for work, numbers in zip(outcome.works, (stretches, others), strict=True)
+    )
     works = np.where(times[:, None] > known_until, np.nan, work_of_tree)
     unresolved = np.max([*rest_of_tree, *rest], axis=0)[:, np.isinf(known_until)].max(axis=1, initial=0.0)
     by_tree, by_bodies = by_tree._replace(works=works), by_bodies._replace(works=work_of_bodies)
-    cut = None if held_paths else cut_early(tree.early(), paths[0], float(times[-1]), breaking, times, kinds)
     left = None
-    if cut is not None:
-        earlier = at_times(cut[0], counterparts((paths[0], cut[0]), stretches, kinds), times, kinds)
-        early = _by_the_tree(tree, cut[0], times, states_of(tree, cut[0], times, earlier), earlier)
-        early_works = work_along(mechanism, units, tree, cut[0]).at(seconds, earlier)[0]
-        early = early._replace(record=on_same_turns(scaled, by_tree.record, early.record), works=early_works)
-        left = _in_si(mechanism, units, early), cut[1]
-    middles = _between(tree, routes[0], paths[0])
+    if early is not None:
+        earlier = at_times(early, counterparts((paths[0], early), stretches, kinds), times, kinds)
+        cut = _by_the_tree(tree, early, times, states_of(tree, early, times, earlier), earlier)
+        cut = cut._replace(
+            record=on_same_turns(scaled, by_tree.record, cut.record),
+            works=work_along(mechanism, units, tree, early).at(seconds, earlier)[0],
+        )
+        left = _in_si(mechanism, units, cut), in_one_mode(paths[0], early, times, kinds)
     motion = replace(
         two_route_motion(
             mechanism,
@@ -150,13 +156,18 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array, faces: Sequence[
         ),
         laws=outcome.laws,
         tiles=outcome.tiles,
-        between=None if middles is None else _in_si(mechanism, units, middles),
+        between=_between(mechanism, units, tree, routes[0], paths[0]),
     )
     if not scaled.contacts:
         return motion
     last = min(until, *(path.stretches[-1].end for path in paths))
     bounces = contact_bounces(scaled, [(tree, paths[0]), (bodies, paths[1])], motion.events, units, last)
     return replace(motion, bounces=bounces)
+
+
+def _cut(paths: tuple[_Path, _Path], end: float, text: str) -> tuple[_Path, _Path]:
+    """Both paths up to a time, and the reason why they end there."""
+    return cut_at(paths[0], end, text), cut_at(paths[1], end, text)
 
 
 def _states(
@@ -210,13 +221,12 @@ def _works_known(tree: ContactTree, path: _Path) -> Array:
 def _kinds(dynamics: ContactDynamics, mode: ContactMode) -> tuple[tuple[str, bool], ...]:
     """Part of a mode in which both routes must agree: kinds, and the sense of a joint that slides against friction."""
     return tuple(
-        (acting.kind, isinstance(law, JointContact) and acting.kind == "slip" and _rises(acting))
+        (
+            acting.kind,
+            isinstance(law, JointContact) and acting.kind == "slip" and bool(acting.along and acting.along[1] > 0),
+        )
         for acting, law in zip(mode, dynamics.contacts, strict=True)
     )
-
-
-def _rises(acting: Acting) -> bool:
-    return acting.along is not None and acting.along[1] > 0
 
 
 def _names(tree: ContactTree, bodies: ContactBodies) -> tuple[str, str]:
@@ -274,13 +284,15 @@ def _by_the_tree(tree: ContactTree, path: _Path, times: Array, states: Array, st
     )
 
 
-def _between(tree: ContactTree, route: HybridRoute[ContactMode], path: _Path) -> Routed | None:
-    """Motion and forces of the first route in the middle of each stretch of a path; None: it has none."""
-    lasting = [number for number, stretch in enumerate(path.stretches) if stretch.end > stretch.start]
+def _between(
+    mechanism: Mechanism, units: Units, tree: ContactTree, route: HybridRoute[ContactMode], path: _Path
+) -> Routed | None:
+    """Motion and forces of the first route in the middle of each stretch of a path that has them; None: it has none."""
+    lasting = [k for k, stretch in enumerate(path.stretches) if stretch.end > stretch.start and not stretch.summed]
     if not lasting:
         return None
     times = np.array([path.stretches[k].middle for k in lasting])
-    return _by_the_tree(tree, path, times, states_of(route, path, times, lasting), lasting)
+    return _in_si(mechanism, units, _by_the_tree(tree, path, times, states_of(route, path, times, lasting), lasting))
 
 
 def _sums_along(placed: Placed, pressed: Array) -> Array:

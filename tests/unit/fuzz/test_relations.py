@@ -6,7 +6,9 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+import xarray as xr
 
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
@@ -93,3 +95,15 @@ def test_losses_are_not_reversed(tmp_path: Path) -> None:
     tables["joints"][0]["friction"] = 0.1
     assert _evaluated(tmp_path, tables, "reversed", _RELATIONS["reversed"]).surprises == ()
     assert not (tmp_path / "scene" / "reversed").exists()
+
+
+@pytest.mark.parametrize("relation", ["reordered", "welded"])
+def test_bodies_inside_joints_are_held_in_the_order_of_the_scene(relation: str) -> None:
+    """A joint that is read as several has bodies of its own, which follow those of the file by the names of joints."""
+    tables = {"bodies": [{"name": "a"}, {"name": "b"}], "joints": [{"name": "j"}, {"name": "k"}]}
+    bodies = ["b", "a", "half_of_a", "k.outer", "j.outer", "j.middle"]
+    places = np.arange(6.0)[None, :, None] * np.ones((2, 6, 3))
+    truth = xr.Dataset(
+        dict.fromkeys(("p_WB", "v_WB"), (("time", "body", "xyz"), places)), coords={"body": ("body", bodies)}
+    )
+    assert _RELATIONS[relation].back(truth, tables)["p_WB"][0, :, 0].tolist() == [1.0, 0.0, 4.0, 5.0, 3.0]

@@ -160,6 +160,33 @@ def test_only_a_ball_on_a_wall_has_a_motion_to_resist() -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.parametrize("aside", [0.0, 0.3])
+def test_an_arm_longer_than_that_of_friction_rocks_a_ball_to_rest(aside: float) -> None:
+    """With f > (1 + k) μ a a ball turns back ever faster, by (f - (1 + k) μ a)/(f + (1 + k) μ a) each time, to rest.
+
+    By hand along a line: while the centre goes on it slows by μ g, and a times the spin by (f/a - μ) g/k; after it has
+    turned the spin slows by (f/a + μ) g/k until the ball rolls, with that part of its speed, and goes back.
+    """
+    speed, k, mu, part = math.hypot(1.0, aside), 0.4, 0.2, 0.5
+    true = found(ball((1.0, aside, 0.0), (-aside / RADIUS, 1.0 / RADIUS, 0.0), f=part * RADIUS), 1.0, 1.5)
+    assert "ended" not in true.attrs
+    back = ((part - mu) / (k * mu) - 1) * speed  # a times the spin beyond rolling when the centre turns
+    slows = G * (mu + (part + mu) / k)
+    times, ratio = speed / (mu * G) + back / slows, (part - mu * (1 + k)) / (part + mu * (1 + k))
+    way = (speed**2 / (2 * mu * G) - mu * G * (back / slows) ** 2 / 2) / (1 + ratio**2)
+    *turns, rest = events_of(true)
+    assert (rest.kind, {event.kind for event in turns}) == ("rest", {"turn"})
+    assert [event.time for event in turns[:3]] == pytest.approx(
+        [times, times * (1 + ratio), times * (1 + ratio + ratio**2)], abs=1e-11
+    )
+    assert rest.time_low <= times / (1 - ratio) <= rest.time_high
+    place = np.array([1.0, aside]) / speed * way
+    assert true["p_WB"].to_numpy()[-1, 0, :2] == pytest.approx(place, abs=bar(true))
+    assert float(np.abs(true["v_WB"][-1]).max()) <= 1e-20
+    assert "energy_gain" not in true  # the moment feeds the back spin
+
+
+@pytest.mark.drill
 def test_a_turntable_resists_the_motion_that_it_sees() -> None:
     """A ball that slips on a plane that turns loses energy by its motion relative to the plane; both routes agree."""
     joint = Joint("turn", "revolute", "world", "table", axis=(0.0, 0.0, 1.0), motion=Formula("3*t"))

@@ -91,6 +91,34 @@ def test_samples_that_would_take_too_long_are_left_out(name: str, monkeypatch: p
 
 
 @pytest.mark.drill
+@pytest.mark.parametrize("begins", [5.3, 5.9])
+def test_a_limit_that_ends_the_early_sum_of_rebounds_ends_the_truth(
+    begins: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The error of the sum is that of a second path: where the limit ends this, the truth ends, too."""
+    scene, clock, follow = load_scene("bouncing_ball", restitution=0.5), [0.0], PACE.follow
+    whole = truth(scene, 2 * TIMES)
+
+    def begun(route: str, end: float, *, smooth: bool = False) -> None:
+        follow(route, end, smooth=smooth)
+        clock[0] = begins if route == "early" else 0.0
+
+    def looked() -> float:
+        clock[0] += 0.1 * (clock[0] > 0)
+        return clock[0]
+
+    monkeypatch.setattr("proofroll.core.pace.time.process_time", looked)
+    monkeypatch.setattr(PACE, "follow", begun)
+    with PACE.limited(6.0):
+        cut = truth(scene, 2 * TIMES)
+    count, (end, reason) = len(cut.time), ended_early(cut) or (0.0, "")
+    assert (PACE.over, reason) == (True, "its limit of 6 s of processor time was reached")
+    assert 0 < count < len(whole.time)
+    assert end > cut.time[-1]
+    assert float(np.abs(cut["positions"].to_numpy() - whole["positions"].to_numpy()[:count]).max()) <= 1e-12
+
+
+@pytest.mark.drill
 @pytest.mark.usefixtures("ticking")
 def test_a_truth_that_was_cut_is_not_stored(tmp_path: Path) -> None:
     """A worker gives what the truth has found, and the next run does not take that for the whole."""

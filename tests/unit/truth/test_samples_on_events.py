@@ -59,3 +59,15 @@ def test_a_sample_on_a_turn_of_a_slip_has_the_force_after_it() -> None:
     assert found.pressed is not None
     assert found.pressed[1, 0, 0] < -0.5  # N
     assert found.bars["pressed"].max() < 1e-11
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("last_digits", [-30, -1, 0, 1, 30])
+def test_a_run_that_ends_on_a_slip_from_rest_has_all_before_it(last_digits: int) -> None:
+    """A pushed box is known to the last time, whichever of its last digits lie before the slip that begins there."""
+    mechanism = the_mechanism(load_scene("pushed_box", push=137.0)).mechanism
+    slip = truth_of(mechanism, np.array([0.0, 0.6])).events[0].time
+    end = slip + last_digits * float(np.spacing(slip))
+    found = truth_of(mechanism, np.array([0.0, end / 2, end]))
+    assert (found.ended, len(found.record.time)) == ("", 3)
+    assert float(np.abs(found.record.v_WB).max()) < 1e-15

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from proofroll.core.comparison import Tolerance
@@ -12,7 +13,7 @@ from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.studies.judging.reference import Reference
 
-FORMS = "write 1e-4 of the path, '0.1 %' of it, '1 mm', or QUANTITY='1 mm'"
+FORMS = "write 1e-4 of the path, '0.1 %' of it, '1 mm', or QUANTITY='1 mm', above 0"
 DEFAULT = "1e-4"
 _PART = re.compile(r"\s*(\d*\.?\d+\.?(?:[eE][-+]?\d+)?)\s*(?:of\s+(?:the\s+)?path)?\s*")
 _LENGTH, _COMPONENTS = "m", "1"
@@ -107,16 +108,11 @@ def bounds_of(texts: Sequence[str], units: Mapping[str, str], unit_of: Callable[
 
 def _common(text: str, units: Mapping[str, str]) -> dict[str, Tolerance]:
     """Bounds of all quantities in which a text without a name can be read; a bare number is a part of the path."""
-    part = _PART.fullmatch(text)
-    percentage = text if part is None else f"{100 * float(part[1]):.17g} %"
-    if percentage.rstrip().endswith("%"):
-        return dict.fromkeys(units, Tolerance.of_quantity("tolerance", percentage, "1"))
-    bounds = {}
+    part, bounds = _PART.fullmatch(text), dict[str, Tolerance]()
+    value = text if part is None else f"{100 * float(part[1]):.17g} %"
     for name, unit in units.items():
-        try:
-            bounds[name] = Tolerance.of_quantity("tolerance", text, unit)
-        except InputError:
-            continue
+        with suppress(InputError):
+            bounds[name] = Tolerance.of_quantity("tolerance", value, "1" if value.rstrip().endswith("%") else unit)
     if not bounds:
         told = ", ".join(f"{name} [{unit}]" for name, unit in units.items())
         raise InputError("tolerance", text, f"{FORMS}; judged here are {told}")

@@ -23,7 +23,7 @@ from proofroll.elements.mechanism.contact.modes import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.rolling_and_spin import moved_by_slip, shut_by_pressing, standing
+from proofroll.elements.mechanism.contact.rolling_and_spin import led_by_slip, shut_by_pressing, standing
 from proofroll.elements.mechanism.contact.sequences import groups_of
 from proofroll.elements.mechanism.contact.start import closed_and_still, start_digits
 from proofroll.elements.mechanism.contact.touching import Touching
@@ -393,7 +393,7 @@ class ContactBodies(ContactStretches):
         touch, mu, bound = bodies.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
         size_f, size_s = float(np.abs(solution.force).max()), max(float(np.abs(solution.slide).max()), free) or 1.0
         if acting.kind == "open":
-            moves = float(np.linalg.norm(solution.slide[k])) * moved_by_slip(self.contacts[k], solution.mode)
+            moves = float(np.linalg.norm(solution.slide[k])) * led_by_slip(self.contacts[k], solution.mode)
             resists = self.contacts[k].pressed_by is not None and moves <= SLACK * size_s
             return np.inf if resists else (float(solution.parting[k]) - moves) / size_s
         normal = np.inf if bound else normal

@@ -15,22 +15,22 @@ from proofroll.truth.bodies.maximal_bodies import AXES, BodyInScalars
 from proofroll.truth.bodies.maximal_equations import Switched
 from proofroll.truth.bodies.maximal_taylor import BodySystem
 from proofroll.truth.numerics.elimination import Row
-from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub, turned
+from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, turned
 from proofroll.truth.switching.contact_symbols import (
     ScalarTouch,
     SolvedSymbols,
-    TurningMoments,
+    UnknownForces,
     Vector,
     floats,
     kink_guards,
     known_shapes,
     limited,
+    lines_of,
     of_joint,
     of_turning,
     opposed_rates,
     resisted,
     resisted_rate,
-    rows_of,
     scalar_motion,
     touch_in_scalars,
     worth_compiling,
@@ -80,19 +80,13 @@ class BodySymbols:
         e = self._bodies
         kinks = Sides(e.mechanism.kinks, clamped[len(self._equations.limited) :])
         functions = kinks.functions(functions)
-        numbers_of_limits = [k for k, actuator in enumerate(e.mechanism.actuators) if actuator.limit is not None]
-        limited_ones = [
-            (
-                k,
-                limited(
-                    self._wanted(state, k, functions), float(e.mechanism.actuators[k].bound), sign, functions["sqrt"]
-                ),
-            )
-            for k, sign in zip(numbers_of_limits, clamped, strict=False)
-        ]
-        efforts = {k: effort for k, (effort, _) in limited_ones}
+        efforts, limits = dict[int, Scalar](), list[Scalar]()
+        limited_ones = (k for k, actuator in enumerate(e.mechanism.actuators) if actuator.limit is not None)
+        for k, sign in zip(limited_ones, clamped, strict=False):
+            bound = float(e.mechanism.actuators[k].bound)
+            efforts[k], guard = limited(self._wanted(state, k, functions), bound, sign, functions["sqrt"])
+            limits.append(guard)
         motion = e.at(state[:-1], functions, Switched(clamped=efforts), time=state[-1])
-        limits = [*(guard for _, (_, guard) in limited_ones), *kink_guards(kinks)]
         numbers = [law.joint.number for law in self._laws]
         instant = _Now(motion.views, e.rate_rows(state[:-1], numbers, functions))
         touching = [*self._touching(motion.views, features_of(mode)), *self._of_joints(state, instant)]
@@ -100,42 +94,32 @@ class BodySymbols:
         touching += [of_turning(friction, touch, self._relative(friction, instant)) for friction, touch in turns]
         instant = instant._replace(pressing=[touch for _, touch in turns])
         joints = [motion.rows[k] for k in self._kept]
-        lines = self._lines(began, mode, touching, instant, BodySystem(e, motion, joints), functions)
-        rows, aims, force = list[tuple[Row, Row]](), list[Scalar](), list(motion.force)
-        owner: list[tuple[int, Vector]] = []
-        contacts, root = self._equations.contacts, functions["sqrt"]
-        turning = TurningMoments(mode, contacts, touching, lines, root)
+        contacts, force, root = self._equations.contacts, list(motion.force), functions["sqrt"]
 
         def row_of(k: int, direction: Vector) -> Row:
             return self._row(k, touching[k], direction, instant)
 
+        def responses_of(pushes: list[tuple[int, Vector]]) -> list[Vector]:
+            answers = BodySystem(e, motion, joints).responses([row_of(k, push) for k, push in pushes])
+            return [
+                self._moved(k, touching[k], answer, instant) for (k, _), answer in zip(pushes, answers, strict=True)
+            ]
+
+        lines = lines_of(mode, contacts, touching, began, responses_of, root)
         for k, (acting, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
-            if acting.kind == "open":
-                continue
-            part = rows_of(acting.kind, touch, line, contacts[k], root)
-            rate = self._bias(k, touch, instant)
             if line is not None and acting.kind == "slip" and (bound := float(self._equations.bounds[k])):
                 for n, value in self._row(k, touch, scaled(-bound, line), instant).items():
                     force[n] = add(force[n], value)
-            for direction, push in zip(part.directions, part.along, strict=True):
-                row = self._row(k, touch, direction, instant)
-                pushed = row if push is direction else self._row(k, touch, push, instant)
-                rows.append((row, turning.pushed(pushed, len(owner), k, push, row_of)))
-                beyond = dot(touch.normal_rate, touch.slide) if acting.kind == "slip" else 0.0
-                aims.append(sub(sub(0.0, dot(direction, rate)), beyond))
-                owner.append((k, push))
-        accelerations, multipliers, sizes, pivots = BodySystem(e, motion, joints, rows).accelerated(force, aims)
+        unknown = UnknownForces(
+            mode, contacts, touching, lines, root, row_of, lambda k: self._bias(k, touching[k], instant)
+        )
+        system = BodySystem(e, motion, joints, list(zip(unknown.rows, unknown.pushes, strict=True)))
+        accelerations, multipliers, sizes, pivots = system.accelerated(force, unknown.aims)
         response: Scalar = 1.0
         if any(acting.kind == "slip" and mu for acting, mu in zip(mode, self._equations.friction, strict=True)):
-            smooth = BodySystem(e, motion, joints, [(row, row) for row, _ in rows]).pivots()
+            smooth = BodySystem(e, motion, joints, [(row, row) for row in unknown.rows]).pivots()
             for pivot, smooth_pivot in zip(pivots, smooth, strict=True):
                 response = mul(response, pivot / smooth_pivot)
-        forces: list[Vector | None] = [None if acting.kind == "open" else [0.0, 0.0, 0.0] for acting in mode]
-        for (k, push), size in zip(owner, sizes, strict=True):
-            own_force = forces[k]
-            assert own_force is not None  # its owner is closed
-            forces[k] = plus(own_force, scaled(size, push))
-        turning.add_to(forces, sizes)
         moved = [
             plus(self._moved(k, touch, accelerations, instant), self._bias(k, touch, instant))
             for k, touch in enumerate(touching)
@@ -144,10 +128,10 @@ class BodySymbols:
             rates=[*motion.rate, *accelerations, *motion.angle_rate],
             touching=touching,
             lines=lines,
-            forces=forces,
+            forces=unknown.forces(sizes),
             response=response,
             slide_rates=opposed_rates(contacts, touching, moved),
-            within_limits=limits,
+            within_limits=[*limits, *kink_guards(kinks)],
             poses=self._poses(motion.views)[:-1],
             efforts=motion.efforts,
             drives=self._drives(motion.moved, multipliers),
@@ -239,24 +223,3 @@ class BodySymbols:
             return scaled(instant.laws[k - self._touchings].bias, floats(self._laws[k - self._touchings].direction))
         a, b = (instant.views[body] for body in self._equations.pairs[k])
         return minus(*(cross(view.w, minus(touch.place_rate, view.v)) for view in (a, b)))
-
-    def _lines(
-        self,
-        began: Sequence[Vector | None],
-        mode: ContactMode,
-        touching: Sequence[ScalarTouch],
-        instant: _Now,
-        system: BodySystem,
-        functions: Any,
-    ) -> list[Vector | None]:
-        """Present direction of the only line along which each contact can slide: where a force across would move it."""
-        lines = list(began)
-        turned = {
-            k: self._row(k, touching[k], touching[k].across(line), instant)
-            for k, line in enumerate(began)
-            if line is not None and not (self._touchings <= k < self._alone or mode[k].leads)
-        }
-        for k, answer in zip(turned, system.responses(list(turned.values())) if turned else (), strict=True):
-            way = touching[k].across(self._moved(k, touching[k], answer, instant))
-            lines[k] = scaled(1.0 / functions["sqrt"](dot(way, way)), way)
-        return lines

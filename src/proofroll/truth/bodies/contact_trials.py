@@ -8,7 +8,7 @@ import numpy as np
 from proofroll.elements.mechanism.contact.distributions import best_distribution, cones_of
 from proofroll.elements.mechanism.contact.joint_laws import line_response
 from proofroll.elements.mechanism.contact.modes import OPEN, REST, Acting, ContactMode, first_mode
-from proofroll.elements.mechanism.contact.rolling_and_spin import moved_by_slip
+from proofroll.elements.mechanism.contact.rolling_and_spin import led_by_slip
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
 from proofroll.truth.bodies.contact_equations import BodiesState, ContactEquations
 from proofroll.truth.switching.contact_guards import Touchable
@@ -53,7 +53,7 @@ def follow(contacts: Sequence[Touchable], mode: list[Acting], choices: Sequence[
             continue
         if mode[contact.pressed_by].kind == "open":
             mode[k] = OPEN
-        elif moved_by_slip(contact, mode):
+        elif led_by_slip(contact, mode):
             mode[k] = OPEN if mode[k].kind == "stick" else mode[k]
         elif mode[k].kind == "open":
             mode[k] = choices[k][0]

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
 from proofroll.elements.mechanism.scene.rotations import Array, frame_of_axis
+from proofroll.truth.numerics import scalars
 from proofroll.truth.numerics.scalars import Scalar, add, clean, cross, dot, mul, plus, scaled, turned, turned_back
 
 _PARALLEL = 1e-12  # cross product of axes of a planar mechanism up to which they are parallel
@@ -72,12 +73,7 @@ class GeneralBody:
 
     def view(self, x: Sequence[Scalar], u: Sequence[Scalar], _: Mapping[str, Any]) -> BodyInScalars:
         """Pose and velocities for coordinates x, with a unit quaternion, and velocities u."""
-        a, b, c, d = x[3:]
-        R = (
-            (1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)),
-            (2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)),
-            (2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)),
-        )
+        R = scalars.of_quaternion(x[3:])
         return BodyInScalars(x[:3], R, u[:3], turned(R, u[3:]))
 
     def projected(self, view: BodyInScalars, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
@@ -90,14 +86,7 @@ class GeneralBody:
 
     def rate(self, x: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
         """Rates ẋ of the coordinates."""
-        (a, b, c, d), (p, q, r) = x[3:], u[3:]
-        return [
-            *u[:3],
-            -0.5 * (b * p + c * q + d * r),
-            0.5 * (a * p + c * r - d * q),
-            0.5 * (a * q + d * p - b * r),
-            0.5 * (a * r + b * q - c * p),
-        ]
+        return [*u[:3], *scalars.quaternion_rate(x[3:], u[3:])]
 
 
 class Planar:

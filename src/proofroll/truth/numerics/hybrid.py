@@ -107,6 +107,7 @@ class Stretch(Generic[ModeT]):
         blur: uncertainty of the end by the error of a step in its guard, however slowly that reaches zero [s].
         dense: start and end of each step [s] and its states inside, (state, times), of an integrator that has them.
         exact: True if these have as many digits inside a step as at its ends.
+        summed: True if it stands for infinitely many changes of the forces.
     """
 
     start: float
@@ -120,6 +121,7 @@ class Stretch(Generic[ModeT]):
     blur: float = 0.0
     dense: Sequence[DenseStep] = ()
     exact: bool = False
+    summed: bool = False
 
     @property
     def middle(self) -> float:

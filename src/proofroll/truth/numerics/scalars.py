@@ -91,3 +91,24 @@ def turned_back(R: Sequence[Vector], a: Vector) -> list[Scalar]:
 def product(R: Sequence[Vector], S: Sequence[Vector]) -> list[list[Scalar]]:
     """Product R S."""
     return [[dot(row, column) for column in zip(*S, strict=True)] for row in R]
+
+
+def of_quaternion(q: Vector) -> tuple[Vector, Vector, Vector]:
+    """Rotation by rows of a unit quaternion, scalar first."""
+    a, b, c, d = q
+    return (
+        (1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)),
+        (2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)),
+        (2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)),
+    )
+
+
+def quaternion_rate(q: Vector, w: Vector) -> list[Scalar]:
+    """Rate of a unit quaternion by the angular velocity in the axes that it turns."""
+    (a, b, c, d), (x, y, z) = q, w
+    return [
+        -0.5 * (b * x + c * y + d * z),
+        0.5 * (a * x + c * z - d * y),
+        0.5 * (a * y + d * x - b * z),
+        0.5 * (a * z + b * y - c * x),
+    ]

@@ -32,7 +32,7 @@ from proofroll.elements.mechanism.contact.modes import (
     slip_velocity,
     with_features,
 )
-from proofroll.elements.mechanism.contact.rolling_and_spin import opened, require_moving, shut_by_pressing
+from proofroll.elements.mechanism.contact.rolling_and_spin import led_by_slip, opened, require_moving, shut_by_pressing
 from proofroll.elements.mechanism.contact.touching import Touching, lying, torn
 from proofroll.elements.mechanism.dynamics.switches import Settling
 from proofroll.elements.mechanism.scene.rotations import Array
@@ -57,6 +57,7 @@ from proofroll.truth.switching.stopping_slip import StoppingSlip
 _PULL = 1e-9
 _GRIP = 2e-14  # error of the margin of a grip in both routes, by its barriers: of times, 1e-14 is seen
 _SOON = 1e-3  # natural time by which a Runge-Kutta step shows a motion that begins smoothly: its error is below 1e-15
+_LAST_TURN = 10 * FAINT  # speed at a turn of a slip, in natural units, up to which the turns that follow are summed
 _LONGEST = 8  # impacts of one cycle at most
 # Difference of the ratios of speeds and of intervals up to which a series is geometric: 5e-5 is seen, of round-off in
 # intervals of 1e-6 natural times, and both differ by the speed itself.
@@ -426,6 +427,9 @@ class ContactStretches(ContactWalks):
         if stretch.mode[k].along is None and not isinstance(stretch, BegunSlip | StoppingSlip):
             ending = stretch.mode[k]._replace(stops=True)
             return Transition(stretch.last, (*stretch.mode[:k], ending, *stretch.mode[k + 1 :]), ())
+        if not stretch.summed and (rocked := self._rocked_to_rest(stretch, k)):
+            mode = tuple(acting._replace(stops=j in rocked) for j, acting in enumerate(stretch.mode))
+            return Transition(stretch.last, mode, ((EventKind.TURN, self.contacts[k].name),))
         closed_mask, solved = closed_in(stretch.mode), self._solved(stretch.last, stretch.mode)
         slides = [k for k, acting in enumerate(stretch.mode) if acting.kind == "slip"]
         slips = np.linalg.norm([slip_velocity(solved.touching[k]) for k in slides], axis=1)
@@ -434,6 +438,20 @@ class ContactStretches(ContactWalks):
             if ended.mode is not None and self._stands(ended.state, ended.mode):
                 return replace(ended, blur=float((slips / np.linalg.norm(solved.slide_rate[slides], axis=1)).max()))
         return self._after(stretch, stretch.last, closed_mask, ())
+
+    def _rocked_to_rest(self, stretch: Stretch[ContactMode], k: int) -> set[int]:
+        """A contact whose slip turns ever faster, and its resistance against motion, if they rest when that is over.
+
+        With an arm longer than that of friction a ball goes to and fro: its speed falls by the same part each time.
+        """
+        for j, contact in enumerate(self.contacts):
+            if contact.pressed_by == k and led_by_slip(contact, stretch.mode):
+                speed = float(np.linalg.norm(self._touching(stretch.last, features_of(stretch.mode))[j].slide))
+                series = self._series.after(contact.pair, Impact(stretch.end, frozenset({j}), speed))
+                if series is not None and speed <= _LAST_TURN:
+                    self._rests_in = series.remaining
+                    return {j, k}
+        return set()
 
     def _after(
         self,

@@ -23,7 +23,7 @@ from proofroll.elements.mechanism.scene.shapes.geometry import BodyContact
 from proofroll.elements.mechanism.scene.shapes.shapes import CircleShape, EllipsoidShape, HalfSpace, SphereShape
 from proofroll.elements.mechanism.scene.shapes.walls import CurvedWall
 from proofroll.truth.numerics.elimination import Row
-from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, scaled, sub
+from proofroll.truth.numerics.scalars import Scalar, add, cross, dot, minus, mul, plus, scaled, sub
 from proofroll.truth.switching.contact_guards import LEAST_RESPONSE, NOT_SHARED, TURNED, ContactGuard, Touchable
 
 Vector = Sequence[Scalar]
@@ -121,30 +121,6 @@ class SolvedSymbols(NamedTuple):
     drives: Sequence[Scalar] | None = ()
 
 
-class HeldRows(NamedTuple):
-    """Directions of a contact's rows and of the forces in them, (rows, 3) each."""
-
-    directions: Sequence[Vector]
-    along: Sequence[Vector]
-
-
-def held_rows(
-    kind: str, touch: ScalarTouch, line: Vector | None, friction: Scalar, root: Callable[[Scalar], Scalar]
-) -> HeldRows:
-    """Rows of a closed contact; friction of a slip is a load that its normal force brings."""
-    if kind == "stick":
-        if line is None:
-            axes: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
-            return HeldRows(axes, axes)
-        return HeldRows([touch.normal, line], [touch.normal, line])
-    if is_zero(friction):
-        return HeldRows([touch.normal], [touch.normal])
-    if line is None:
-        slip = touch.across(touch.slide)
-        line = scaled(1.0 / root(dot(slip, slip)), slip)
-    return HeldRows([touch.normal], [minus(touch.normal, scaled(friction, line))])
-
-
 def of_joint(contact: JointContact, q: Scalar, v: Scalar) -> ScalarTouch:
     """A law of a joint as a contact, at a coordinate and its rate; see :meth:`JointContact.touching`."""
     return ScalarTouch(
@@ -171,18 +147,23 @@ def kink_guards(kinks: Sides) -> list[Scalar]:
 
 def rows_of(
     kind: str, touch: ScalarTouch, line: Vector | None, contact: Touchable, root: Callable[[Scalar], Scalar]
-) -> HeldRows:
-    """Rows of a closed contact or law of a joint; dry friction of a joint and of turning has no normal."""
-    if contact.pressed_by is not None and kind == "slip":
-        return HeldRows([], [])
-    if contact.pressed_by is not None and line is None:  # rolling that stands in its plane
-        first = cross(touch.normal, _ASIDE)
-        ways: list[Vector] = [first, cross(touch.normal, first)]
-        return HeldRows(ways, ways)
+) -> list[tuple[Vector, Vector]]:
+    """Directions of the rows of a closed contact or law of a joint, each with that of the force in it.
+
+    Dry friction of a joint and of turning has no normal; that of a slip is a load that the normal force brings.
+    """
+    ways: list[Vector] = [touch.normal]
     if contact.bound or contact.pressed_by is not None:
-        assert line is not None  # it has one coordinate
-        return HeldRows([line], [line]) if kind == "stick" else HeldRows([], [])
-    return held_rows(kind, touch, line, float(contact.friction), root)
+        first = cross(touch.normal, _ASIDE)  # of rolling that stands in its plane
+        standing: list[Vector] = [first, cross(touch.normal, first)] if line is None else [line]
+        ways = standing if kind == "stick" else []
+    elif kind == "stick":
+        ways = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)] if line is None else [touch.normal, line]
+    elif contact.friction:
+        slip = touch.across(touch.slide)
+        line = scaled(1.0 / root(dot(slip, slip)), slip) if line is None else line
+        return [(touch.normal, minus(touch.normal, scaled(float(contact.friction), line)))]
+    return [(way, way) for way in ways]
 
 
 def guard_symbols(
@@ -302,8 +283,38 @@ def opposed_rates(
     return whole
 
 
-class TurningMoments:
-    """Moments of friction against turning that the normal forces of contacts bring."""
+def lines_of(
+    mode: ContactMode,
+    contacts: Sequence[Touchable],
+    touching: Sequence[ScalarTouch],
+    began: Sequence[Vector | None],
+    responses: Callable[[list[tuple[int, Vector]]], Sequence[Vector]],
+    root: Callable[[Scalar], Scalar],
+) -> list[Vector | None]:
+    """Present direction of the only line along which each contact can slide: where a force across would move it.
+
+    Those of joints never turn, and those of contacts that lead are given. ``began``: the lines at the start;
+    ``responses``: changes of the slides of contacts by unit forces on them in directions.
+    """
+    lines, turning = list(began), list[tuple[int, Vector]]()
+    for k, (acting, contact, touch, start) in enumerate(zip(mode, contacts, touching, began, strict=True)):
+        if start is not None and not acting.leads and not isinstance(contact, JointContact):
+            turning.append((k, touch.across(start)))
+    for (k, _), moved in zip(turning, responses(turning) if turning else (), strict=True):
+        way = touching[k].across(moved)
+        lines[k] = scaled(1.0 / root(dot(way, way)), way)
+    return lines
+
+
+class UnknownForces:
+    """Unknown forces of closed contacts, with the moments of friction against turning that their normal parts bring.
+
+    Attributes:
+        rows: coefficients, along the velocities, of the slide in the direction that each has to hold.
+        pushes: loads by a unit of each.
+        aims: rates of these slides that accelerations have to give.
+        owner: contact and direction of each.
+    """
 
     def __init__(
         self,
@@ -312,35 +323,47 @@ class TurningMoments:
         touching: Sequence[ScalarTouch],
         lines: Sequence[Vector | None],
         root: Callable[[Scalar], Scalar],
+        row_of: Callable[[int, Vector], Row],
+        bias_of: Callable[[int], Vector],
     ) -> None:
-        self._touching, self._found = touching, list[tuple[int, int, Vector]]()
-        self._acting: list[tuple[int, int, Vector]] = []  # friction, what presses, moment by a unit normal force
-        for k, (acting, contact, touch, line) in enumerate(zip(mode, contacts, touching, lines, strict=True)):
-            if acting.kind != "slip" or contact.pressed_by is None:
-                continue
-            slip = touch.across(touch.slide)
-            way = scaled(1.0 / root(dot(slip, slip)), slip) if line is None else line
-            self._acting.append((k, contact.pressed_by, scaled(-float(contact.friction), way)))
+        """Takes coefficients of a contact's slide in a direction, and its rate while the velocities stay."""
+        self._mode, self._touching, self._row_of = mode, touching, row_of
+        self._acting = list[tuple[int, int, Vector]]()  # friction, what presses, moment by a unit normal force
+        self._found = list[tuple[int, int, Vector]]()
+        self.rows, self.pushes, self.aims = list[Row](), list[Row](), list[Scalar]()
+        self.owner = list[tuple[int, Vector]]()
+        closed = [
+            item for item in enumerate(zip(mode, contacts, touching, lines, strict=True)) if item[1][0].kind != "open"
+        ]
+        for k, (acting, contact, touch, line) in closed:
+            if acting.kind == "slip" and contact.pressed_by is not None:
+                slip = touch.across(touch.slide)
+                way = scaled(1.0 / root(dot(slip, slip)), slip) if line is None else line
+                self._acting.append((k, contact.pressed_by, scaled(-float(contact.friction), way)))
+        for k, (acting, contact, touch, line) in closed:
+            bias, beyond = bias_of(k), dot(touch.normal_rate, touch.slide) if acting.kind == "slip" else 0.0
+            for direction, push in rows_of(acting.kind, touch, line, contact, root):
+                row = row_of(k, direction)
+                self.rows.append(row)
+                self.pushes.append(self._pushed(row if push is direction else row_of(k, push), k, push))
+                self.aims.append(sub(sub(0.0, dot(direction, bias)), beyond))
+                self.owner.append((k, push))
 
-    def pushed(self, push: Row, place: int, k: int, direction: Vector, row_of: Callable[[int, Vector], Row]) -> Row:
-        """Loads by a unit of an unknown force, with those of the moments that it brings.
-
-        Args:
-            push: loads of the force alone.
-            place: of the force among all unknown ones.
-            k: its contact.
-            direction: its direction.
-            row_of: coefficients of a contact's slide in a direction.
-        """
+    def _pushed(self, push: Row, k: int, direction: Vector) -> Row:
+        """Loads by a unit of the next force, of a contact in a direction, with those of the moments that it brings."""
         for number, by, moment in self._acting:
             if by == k:
                 carried = scaled(dot(self._touching[k].normal, direction), moment)
-                self._found.append((place, number, carried))
-                brought = row_of(number, carried)
+                self._found.append((len(self.owner), number, carried))
+                brought = self._row_of(number, carried)
                 push = {n: add(push.get(n, 0.0), brought.get(n, 0.0)) for n in (push | brought)}
         return push
 
-    def add_to(self, forces: list[Vector | None], sizes: Sequence[Scalar]) -> None:
-        """Adds the moments to the forces of all contacts, from the sizes of the unknown ones."""
-        for place, k, moment in self._found:
-            forces[k] = plus(forces[k] or _NONE, scaled(sizes[place], moment))
+    def forces(self, sizes: Sequence[Scalar]) -> list[Vector | None]:
+        """Forces and moments of all contacts, from the sizes of the unknown ones; None: open."""
+        forces: list[Vector | None] = [None if acting.kind == "open" else [0.0, 0.0, 0.0] for acting in self._mode]
+        parts = [(k, scaled(size, push)) for (k, push), size in zip(self.owner, sizes, strict=True)]
+        parts += [(k, scaled(sizes[place], moment)) for place, k, moment in self._found]
+        for k, part in parts:
+            forces[k] = plus(forces[k] or _NONE, part)
+        return forces

@@ -424,7 +424,8 @@ class CompiledMode:
         begun, start = stretch.visited[0]
         states = np.empty((len(times), len(start)))
         early, pars = times <= begun, self._parameters(stretch.mode, stretch.start)
-        states[early] = start + (times[early] - begun)[:, None] * self.values(start[None], stretch.mode)[2]
+        left = (begun - times[early]) / ((begun - stretch.start) or 1.0)  # of the line in which a slip gets a direction
+        states[early] = start + left[:, None] * (stretch.first - start)
         number = int(early.sum())
         for step in stretch.steps:
             stop = int(np.searchsorted(times, step.last[-1], side="right"))

@@ -72,6 +72,7 @@ _NO_PRESSURE = 1e-13  # force of a contact, in natural units, that is round-off 
 _ONE_WAY = 1e-12  # difference of directions in which slips start together
 # Guard of the first instants of a slip, which goes on.
 _GOES_ON = -1
+_INSTANT = 4  # last digits of a time in which nothing moves, as after an event at the end of a run
 _LOOKS = 32  # at the turn of bushings in a step, which is resolved by half as many points
 
 
@@ -119,6 +120,7 @@ class ContactWalks(ABC):
         self._signs: tuple[int, ...] = ()
         self._jumping = any(JUMP in names for names in equations.mechanism.kinks.values())
         self._used: dict[str, None] = {}
+        self._rests_in = 0.0  # time until a slip that turns ever faster is over
         symbols = self._symbols()
         self._compiled = (
             None if symbols is None else CompiledModes(symbols, self.contacts, length + 1, self._by_collocation)
@@ -218,15 +220,15 @@ class ContactWalks(ABC):
             refuse_jolts(mechanism, time, old_signs[count:], self._signs[count:])
         if not self._equations.mechanism.contacts and self._solved(state, mode).shifts.any():
             raise Refused(REDUNDANT)
-        if self._stands(state, mode):
+        if until - time <= _INSTANT * np.spacing(time) or self._stands(state, mode):
             return Stretch(start=time, end=until, mode=mode, first=state, last=state, guard=None)
+        stopping = next((k for k, acting in enumerate(mode) if acting.stops), None)
+        if stopping is not None:
+            return self._stopping(time, state, mode, stopping)
         led = self._led_from_rest(state, mode)
         if any(acting.leads for acting in led):
             with suppress(*([] if led is mode else [Refused])):
                 return self._begun(time, state, led, until)
-        stopping = next((k for k, acting in enumerate(mode) if acting.stops), None)
-        if stopping is not None:
-            return self._stopping(time, state, mode, stopping)
         guards = guards_of(self.contacts, mode)
         share = next((number for number, guard in enumerate(guards) if guard.kind == "share"), None)
         if share is not None and self._guards(state, mode, [guards[share]])[0] > 0:
@@ -386,7 +388,7 @@ class ContactWalks(ABC):
         return tuple(headed(acting, touch) for acting, touch in zip(mode, touching, strict=True))
 
     def _stopping(self, time: float, state: Array, mode: ContactMode, k: int) -> StoppingSlip:
-        """Last instants of a slip below FAINT.
+        """Last instants of a slip below FAINT, or of one that turns ever faster, until all its turns are over.
 
         The duration of its straight line, with that of the error of the speed, is the uncertainty of the end.
         """
@@ -403,16 +405,22 @@ class ContactWalks(ABC):
             return np.array(speeds), np.array(changes).T
 
         def line_of(y: Array) -> tuple[Array, Array] | None:
-            return self._straight_end(y, self._as_it_goes(y, mode), k)
+            if not rests_in:
+                return self._straight_end(y, self._as_it_goes(y, mode), k)
+            change = np.append((self._equations.eliminated(y, sticking) - y)[:-1], rests_in)
+            return change, change
+
+        rests_in, self._rests_in = self._rests_in, 0.0
+        sticking = tuple(acting._replace(kind="stick", stops=False) if acting.stops else acting for acting in mode)
 
         compiled = self.by_symbols(state, mode)
         decay = by_states if compiled is None else compiled.decay_of(mode, k, time)
         guard = guards_of(self.contacts, mode).index(ContactGuard(k, "still"))
         slip = stopping_slip(time, state, mode, guard, decay, line_of)
         slows = self._solved(slip.line, self._as_it_goes(slip.line, mode)).slide_rate[k]
-        sticking = (*mode[:k], mode[k]._replace(kind="stick", stops=False), *mode[k + 1 :])
         last = self._equations.eliminated(slip.last, sticking)
-        return replace(slip, last=last, blur=(ROUND_OFF + TOLERANCES[1]) / float(np.linalg.norm(slows)))
+        blur = (ROUND_OFF + TOLERANCES[1]) / float(np.linalg.norm(slows))
+        return replace(slip, last=last, blur=blur, summed=rests_in > 0)
 
     def _straight_end(self, state: Array, mode: ContactMode, k: int) -> tuple[Array, Array] | None:
         """Changes of a state until a slip stops along one direction, by its first rates and in fact; None: it turns.

@@ -44,18 +44,18 @@ from proofroll.truth.switching.contact_stretches import ContactStretches
 from proofroll.truth.switching.contact_symbols import (
     ScalarTouch,
     SolvedSymbols,
-    TurningMoments,
+    UnknownForces,
     Vector,
     floats,
     kink_guards,
     known_shapes,
     limited,
+    lines_of,
     of_joint,
     of_turning,
     opposed_rates,
     resisted,
     resisted_rate,
-    rows_of,
     scalar_motion,
     touch_in_scalars,
     worth_compiling,
@@ -121,31 +121,23 @@ class TreeSymbols:
             if start is not None and mode[k].kind == "slip" and bound:  # dry friction, which is as large as it can be
                 for n, value in _along(slides[k][0], scaled(-bound, start)).items():
                     load[n] = add(load[n], value)
-        free, lines = self._lines(mode, began, mass, load, touching, slides, functions)
-        rows: list[Row] = []
-        aims: list[Scalar] = []
-        pushes: list[Row] = []
-        owner: list[tuple[int, Vector]] = []
+        (free,), _ = eliminated(mass, [load])
         contacts, root = self._dynamics.contacts, functions["sqrt"]
-        turning = TurningMoments(mode, contacts, touching, lines, root)
 
         def row_of(k: int, direction: Vector) -> Row:
             return _along(slides[k][0], direction)
 
-        for k, (action, touch, line) in enumerate(zip(mode, touching, lines, strict=True)):
-            if action.kind == "open":
-                continue
-            part = rows_of(action.kind, touch, line, contacts[k], root)
-            beyond = dot(touch.normal_rate, touch.slide) if action.kind == "slip" else 0.0
-            for direction, force_direction in zip(part.directions, part.along, strict=True):
-                rows.append(_along(slides[k][0], direction))
-                pushes.append(turning.pushed(row_of(k, force_direction), len(owner), k, force_direction, row_of))
-                aims.append(sub(sub(0.0, dot(direction, slides[k][1])), beyond))
-                owner.append((k, force_direction))
-        responses, _ = eliminated(mass, [self._free(push) for push in pushes])
+        def responses_of(pushes: list[tuple[int, Vector]]) -> list[Vector]:
+            answers, _ = eliminated(mass, [self._free(row_of(k, push)) for k, push in pushes])
+            return [_moved(slides[k][0], answer) for (k, _), answer in zip(pushes, answers, strict=True)]
+
+        lines = lines_of(mode, contacts, touching, began, responses_of, root)
+        unknown = UnknownForces(mode, contacts, touching, lines, root, row_of, lambda k: slides[k][1])
+        rows = unknown.rows
+        responses, _ = eliminated(mass, [self._free(push) for push in unknown.pushes])
         acting = [_applied(rows, response) for response in responses]
         system: list[Row] = [{j: column[i] for j, column in enumerate(acting)} for i in range(len(rows))]
-        right = [sub(aim, value) for aim, value in zip(aims, _applied(rows, free), strict=True)]
+        right = [sub(aim, value) for aim, value in zip(unknown.aims, _applied(rows, free), strict=True)]
         (sizes,), pivots = eliminated(system, [right])
         response: Scalar = 1.0
         if any(action.kind == "slip" and mu for action, mu in zip(mode, self._dynamics.friction, strict=True)):
@@ -154,14 +146,9 @@ class TreeSymbols:
             _, others = eliminated([{j: column[i] for j, column in enumerate(smooth)} for i in range(len(rows))], [])
             for pivot, smooth_pivot in zip(pivots, others, strict=True):
                 response = mul(response, pivot / smooth_pivot)
-        forces: list[Vector | None] = [None if action.kind == "open" else [0.0, 0.0, 0.0] for action in mode]
-        moved = list(free)
-        for (k, force_direction), size, column in zip(owner, sizes, responses, strict=True):
-            force = forces[k]
-            assert force is not None  # its owner is closed
-            forces[k] = plus(force, scaled(size, force_direction))
+        forces, moved = unknown.forces(sizes), list(free)
+        for size, column in zip(sizes, responses, strict=True):
             moved = plus(moved, scaled(size, column))
-        turning.add_to(forces, sizes)
         slide_rates = [plus(_moved(J, moved), bias) for J, bias in slides]
         drives = []
         for n, row, loaded in inertial.driven:
@@ -206,33 +193,6 @@ class TreeSymbols:
             touching.append(of_joint(contact, q[contact.joint.coordinate], v[n]))
             slides.append(({n: floats(contact.direction)}, _NONE))
         return touching, slides
-
-    def _lines(
-        self,
-        mode: ContactMode,
-        began: Sequence[Vector | None],
-        mass: list[Row],
-        load: list[Scalar],
-        touching: Sequence[ScalarTouch],
-        slides: Sequence[tuple[dict[int, Vector], Vector]],
-        functions: Any,
-    ) -> tuple[list[Scalar], list[Vector | None]]:
-        """Accelerations without contact forces, and present directions of lines: where a force across would move.
-
-        Those of joints never turn, and those of contacts that lead are given.
-        """
-        lines, starts = list(began), enumerate(zip(self._dynamics.contacts, began, mode, strict=True))
-        turning = {
-            k: start
-            for k, (contact, start, acting) in starts
-            if start is not None and not acting.leads and not isinstance(contact, JointContact)
-        }
-        pushes = [self._free(_along(slides[k][0], touching[k].across(start))) for k, start in turning.items()]
-        (free, *answers), _ = eliminated(mass, [load, *pushes])
-        for k, answer in zip(turning, answers, strict=True):
-            way = touching[k].across(_moved(slides[k][0], answer))
-            lines[k] = scaled(1.0 / functions["sqrt"](dot(way, way)), way)
-        return free, lines
 
     def _inertial(
         self,

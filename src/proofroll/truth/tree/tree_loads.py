@@ -16,8 +16,10 @@ from proofroll.truth.numerics.scalars import (
     dot,
     minus,
     mul,
+    of_quaternion,
     plus,
     product,
+    quaternion_rate,
     scaled,
     sub,
     turned,
@@ -186,13 +188,7 @@ def _pose(kind: str, q: Sequence[Scalar], functions: Any) -> tuple[Vector, _Matr
         return (q[0], q[1], 0.0), _about_z(q[2], functions)
     if kind == JointKind.FIXED:
         return NONE, _AXES
-    a, b, c, d = q[-4:]
-    R = (
-        (1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)),
-        (2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)),
-        (2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)),
-    )
-    return (q[:3] if kind == JointKind.FREE else NONE), R
+    return (q[:3] if kind == JointKind.FREE else NONE), of_quaternion(q[-4:])
 
 
 def _about_z(angle: Scalar, functions: Any) -> _Matrix:
@@ -203,11 +199,5 @@ def _about_z(angle: Scalar, functions: Any) -> _Matrix:
 def _coordinate_rates(kind: str, q: Sequence[Scalar], v: Sequence[Scalar], S: _Matrix) -> list[Scalar]:
     if kind not in WITH_QUATERNION:
         return list(v)
-    (a, b, c, d), (x, y, z) = q[-4:], v[-3:]
-    turning = [
-        -0.5 * (b * x + c * y + d * z),
-        0.5 * (a * x + c * z - d * y),
-        0.5 * (a * y + d * x - b * z),
-        0.5 * (a * z + b * y - c * x),
-    ]
+    turning = quaternion_rate(q[-4:], v[-3:])
     return [*turned(S, v[:3]), *turning] if kind == JointKind.FREE else turning

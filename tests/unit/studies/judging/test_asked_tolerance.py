@@ -53,6 +53,13 @@ def test_another_form_is_refused(text: str) -> None:
         AskedTolerance.of([text], SCENE)
 
 
+@pytest.mark.parametrize("text", ["0", "0 %", "0 mm", "1e400"])
+def test_a_tolerance_of_nothing_is_named_as_it_was_written(text: str) -> None:
+    """The one line has the field, what was given and that it lies above 0, whatever unit it was read in."""
+    with pytest.raises(InputError, match=rf"^tolerance = '{text}': write 1e-4 of .* above 0; judged here are"):
+        AskedTolerance.of([text], SCENE)
+
+
 def test_attitudes_are_bounded_by_a_tolerance_of_their_own() -> None:
     """A tolerance of lengths bounds no attitude, and that is known; a tolerance of its own bounds it."""
     assert orientations_of(SCENE, judged_names(SCENE)) == ["attitudes"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,10 +15,16 @@ from tests.unit.truth.test_work_of_drives import TIMES as LIFTED
 from tests.unit.truth.test_work_of_drives import plate_and_ball
 
 from proofroll.core.errors import Refused
+from proofroll.core.events import events_of
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.run.element import MechanismElement
+from proofroll.elements.mechanism.scene.shapes.geometry import Geometry, Pair
+from proofroll.elements.mechanism.scene.signal import Formula
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.check.answer import held_answer
+from proofroll.truth.check.answer import _published, held_answer
+from proofroll.truth.check.laws.contacts import slip_of
+from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.error_bars import TwoRouteMotion, cut_motion
 from proofroll.truth.plug_in import MechanismTruth, _unknown_from
 from proofroll.truth.truth_of_mechanism import truth_of
@@ -182,6 +189,55 @@ def test_an_honest_answer_holds_all_laws(scene: str) -> None:
 
 
 @pytest.mark.drill
+@pytest.mark.drill
+@pytest.mark.parametrize("scene", ["cylinder", "sled", "ellipsoid"])
+def test_a_slip_on_a_plane_follows_from_poses_alone(scene: str) -> None:
+    """Of a rim, a ball and an ellipsoid it has the speed that is published, so that its turn is asked for an event."""
+    element, _, dataset = answer(scene) if scene == "sled" else thrown(scene)
+    laws = LawScene(element.mechanism, element.length, element.speed / element.length)
+    pieces = _published(
+        element, {str(name): np.asarray(item.values) for name, item in dataset.variables.items()}
+    ).pieces
+    for k, contact in enumerate(laws.contacts):
+        speeds = dataset["slips"].to_numpy()[:, k]
+        assert speeds.max() > 1e-2 or "touch.2" in contact.name
+        assert np.linalg.norm(slip_of(contact, pieces)[:, 0], axis=-1) == pytest.approx(speeds, abs=1e-12)
+
+
+def thrown(kind: str) -> tuple[MechanismElement, TwoRouteMotion, xr.Dataset]:
+    """A body that turns as it slides on a plane, on its shell or a rim."""
+    keys: Any = (
+        {"axes": (0.1, 0.08, 0.06)} if kind == "ellipsoid" else {"radius": 0.08, "length": 0.04, "axis": (0, 0.6, 0.8)}
+    )
+    lowest = 0.06 if kind == "ellipsoid" else 0.08 * 0.6 + 0.02 * 0.8
+    q0 = (0.0, 0.0, lowest, 1.0, 0.0, 0.0, 0.0)
+    joint = Joint("free", "free", "world", "body", q0=q0, v0=(0.8, 0.3, 0.0, 0.0, 0.0, 1.0))
+    shapes = (Geometry("shell", "body", kind, **keys), Geometry("floor", "world", "plane"))
+    body = Body("body", 1.0, inertia=(0.002, 0.003, 0.004))
+    pair = Pair("touch", ("shell", "floor"), 0.2)
+    mechanism = Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,), gravity=(0.0, 0.0, -9.81))
+    element, motion = MechanismElement(mechanism), truth_of(mechanism, TIMES[:3])
+    return element, motion, MechanismTruth._dataset(element, motion, "")
+
+
+@pytest.mark.drill
+def test_an_impact_at_the_start_is_no_change_without_a_motion_before_it() -> None:
+    """A capsule that lies on a plate that rises from time 0 on is struck there, and its answer holds all laws."""
+    bodies = Body("body", 0.7, inertia=(0.002, 0.003, 0.003)), Body("plate", 1.0, inertia=(0.01,) * 3)
+    joints = (
+        Joint("free", "free", "world", "body", q0=(0, 0, 0.103, 1, 0, 0, 0), v0=(0.3, -0.5, 0, 0, 0, 3)),
+        Joint("rises", "prismatic", "world", "plate", axis=(0.0, 0.0, 1.0), motion=Formula("0.012*sin(8*t)")),
+    )
+    capsule = Geometry("skin", "body", "capsule", radius=0.103, length=0.122, axis=(1.0, 0.0, 0.0))
+    shapes = (capsule, Geometry("floor", "plate", "plane"))
+    pairs = (Pair("touch", ("skin", "floor"), 0.3, static_friction=0.42),)
+    mechanism = Mechanism(bodies, joints, geometries=shapes, pairs=pairs, gravity=(2.2, 0.0, -9.5))
+    true = MechanismTruth.truth(MechanismElement(mechanism), np.linspace(0.0, 0.4, 9), ())
+    assert "ended" not in true.attrs
+    assert [event.kind for event in events_of(true) if event.time_low <= 0] == ["impact"] * 2
+    assert float(true["v_WB"][0, 0, 2]) == pytest.approx(0.096, abs=1e-13)
+
+
 def test_a_hole_in_the_motion_is_refused() -> None:
     """A part of the time that no piece covers breaks a law, though all samples hold the others."""
     element, motion, dataset = answer("double_pendulum")
@@ -255,6 +311,21 @@ def test_a_broken_law_ends_a_truth_and_keeps_what_lies_before(monkeypatch: pytes
     monkeypatch.setattr(MechanismTruth, "_dataset", staticmethod(at(0)))
     with pytest.raises(Refused, match="what the truth publishes breaks the law"):
         truth(load_scene("double_pendulum"), TIMES)
+
+
+@pytest.mark.parametrize("scene", ["double_pendulum", pytest.param("oscillators", marks=pytest.mark.drill)])
+def test_energy_changes_from_the_start_of_a_scene(scene: str) -> None:
+    """Of samples that begin later it counts from time 0, too, and the check refuses what counts from the first."""
+    element, _, whole = answer(scene)
+    motion = truth_of(element.mechanism, TIMES[8:])
+    later = MechanismTruth._dataset(element, motion, "")
+    name = next(str(name) for name in later.data_vars if str(name) in {"energy_change", "energy_error"})
+    assert later[name].to_numpy() == pytest.approx(whole[name].to_numpy()[8:], abs=1e-12)
+    assert motion.tiles is not None
+    for offset, law in ((0.0, None), (1e-9, "value")):
+        wrong = later.assign({name: later[name].copy(data=later[name].to_numpy() + offset)})
+        first = held_answer(element, wrong, motion.tiles, TIMES[8:]).residuals.first
+        assert (None if first is None else first.law) == law
 
 
 def test_a_bar_is_the_largest_over_the_times() -> None:

@@ -162,12 +162,12 @@ def opposed_rates(contacts: Sequence[Any], touching: Sequence[Touching], rates: 
 def standing(contacts: Sequence[Any], mode: ContactMode) -> ContactMode:
     """Mode in which resistance against motion is open while its contact slips: it holds no turning then."""
     return tuple(
-        OPEN._replace(feature=acting.feature) if acting.kind == "stick" and moved_by_slip(contact, mode) else acting
+        OPEN._replace(feature=acting.feature) if acting.kind == "stick" and led_by_slip(contact, mode) else acting
         for contact, acting in zip(contacts, mode, strict=True)
     )
 
 
-def moved_by_slip(contact: Any, mode: Sequence[Acting]) -> bool:
+def led_by_slip(contact: Any, mode: Sequence[Acting]) -> bool:
     """True for resistance against motion whose contact slips in a mode: the moment has no influence on the motion."""
     return isinstance(contact, TurningFriction) and bool(contact.bend) and mode[contact.pressed_by].kind == "slip"
 
@@ -175,7 +175,7 @@ def moved_by_slip(contact: Any, mode: Sequence[Acting]) -> bool:
 def require_moving(contacts: Sequence[Any], mode: ContactMode, time: float) -> None:
     """Raises Diverged if a ball that stands begins to slip in a mode, where its resistance has no direction yet."""
     for contact, acting in zip(contacts, mode, strict=True):
-        if acting.kind == "stick" and moved_by_slip(contact, mode):
+        if acting.kind == "stick" and led_by_slip(contact, mode):
             raise Diverged(
                 f"{contact.name} begins to slip from rest at t = {time:.6g} s while its rolling resistance holds the "
                 "ball: it is against the motion of a centre that does not move yet; take less of it, or more friction"

@@ -207,10 +207,13 @@ def columns(
     put("energy", energy, "J", "kinetic and potential energy", **unsure)
     # Where something drives or damps, no law keeps the energy: then it is no error.
     gained = "energy_error" if element.conservative else "energy_change"
-    put(gained, energy - energy[0], "J", "energy now minus energy at the start", **unsure)
+    begun = placed if placed.time[0] <= 0.0 else element.start  # the first sample may be later than the start
+    change = energy - begun.energy()[0]
+    put(gained, change, "J", "energy now minus energy at the start", **unsure)
     kept = kept_laws(mechanism)
     if kept:
-        changes = (np.maximum(energy - energy[0], 0.0), *(part - part[0] for part in placed.momentum()))
+        momenta = zip(placed.momentum(), begun.momentum(), strict=True)
+        changes = (np.maximum(change, 0.0), *(part - first[0] for part, first in momenta))
         for (name, unit, meaning), value in zip(LAWS, changes, strict=True):
             if name in kept:
                 put(name, value, unit, meaning, *(("xyz",) if value.ndim > 1 else ()))

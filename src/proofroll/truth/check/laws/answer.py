@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind
-from proofroll.truth.check.laws.contacts import slip_of_ball
+from proofroll.truth.check.laws.contacts import slip_of
 from proofroll.truth.check.laws.impacts import held
 from proofroll.truth.check.laws.integrals import cross, integral
 from proofroll.truth.check.laws.joints import law_of, target_of
@@ -69,7 +69,7 @@ def changes_of(scene: LawScene, tiles: Tiles, published: PublishedValues, residu
         apart = np.append(apart, abs(item.time) if item.time <= 0 else np.inf)
         off = max(min(float(apart.min()), 1 + item.time), item.low - item.time, item.time - item.high)
         residuals.note("change", item.name, np.array([[off]]), 1 + abs(item.time), np.array([[item.time]]))
-        if item.strikes and item.name in contacts and item not in hits:
+        if item.strikes and item.low > 0 and item.name in contacts and item not in hits:
             residuals.note("change", item.name, np.ones((1, 1)), 1.0, np.array([[item.time]]))
 
 
@@ -111,9 +111,9 @@ def _slips(scene: LawScene, tiles: Tiles) -> list[tuple[str, Array]]:
         if joint.friction
     ]
     of_contacts = [
-        (contact.name, slip_of_ball(contact, tiles), [mode.contacts[k] for mode in tiles.modes])
+        (contact.name, slip_of(contact, tiles), [mode.contacts[k] for mode in tiles.modes])
         for k, contact in enumerate(scene.contacts)
-        if contact.pair.friction and "sphere" in {contact.shape_a.kind, contact.shape_b.kind}
+        if contact.pair.friction and {"plane", "sphere"} & {contact.shape_a.kind, contact.shape_b.kind}
     ]
     slipping = ((name, slip, np.array(modes) == "slip") for name, slip, modes in (*of_joints, *of_contacts))
     return [(name, slip * slips[:, None, None]) for name, slip, slips in slipping]
@@ -279,7 +279,9 @@ class AnswerCheck:
             published, places = self._of(published, turns, places, rows)
             determinate_reactions(scene, published, residuals)
             works_follow(scene, tiles, turns, places, published, residuals)
-            values_follow(scene, published, residuals, kinetic_energy(scene, published.pieces))
+            first = tiles.at(np.ix_([0], [0]), self._turns(turns, tiles.holding(tiles.time[0, :1])))
+            begun = first.time[0, 0] == 0 and not struck
+            values_follow(scene, published, residuals, first if begun else published.pieces)
             self._forces(published, tiles, places)
         if between is not None:
             time = between.pieces.time[:, 0]
@@ -351,7 +353,6 @@ class AnswerCheck:
         return np.asarray(np.abs(time * control.rate - np.round(time * control.rate)) < _INSTANT)
 
 
-_ARRAYS = ("time", "pace", "p", "R", "v", "w")
 _RANK = 1e-11  # singular value, relative to the largest, below which reactions are not independent
 _FIXED, _FREE = 1e-9, 1e-4  # change of a component, relative to the largest, that is none, and that is one
 
@@ -363,8 +364,7 @@ def determinate_reactions(scene: LawScene, published: PublishedValues, residuals
     if scene.contacts or not (unknown.any() or m.loops):
         return
     for row in {0, last // 2, last}:
-        poses = BodyPoses(**{name: getattr(published.pieces, name)[[row]] for name in _ARRAYS})
-        most = np.maximum(most, _changes(scene, poses))
+        most = np.maximum(most, _changes(scene, published.pieces.at([row])))
     # drives and couplings have reactions of their own, by which further components may change
     passive = not m.couplings and all(joint.motion is None for joint in m.joints)
     wrong = np.where(unknown, (most < _FIXED) & passive, (most > _FREE) & np.isfinite(wrenches).all(0))

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.truth.check.laws.integrals import along, cross, dot, norm, turned
+from proofroll.truth.check.laws.integrals import along, cross, dot, norm, turned, turned_back
 from proofroll.truth.check.laws.loads import BodyLoads
 from proofroll.truth.check.laws.record import SPREAD, Array, BodyPoses, Pieces
 from proofroll.truth.check.laws.residuals import ROUND, LawResiduals
 from proofroll.truth.check.laws.scene import LawScene, velocity_at
-from proofroll.truth.check.laws.surfaces import PairContact, gap, near, seen_from
+from proofroll.truth.check.laws.surfaces import PairContact, gap, lowest, near, seen_from
 
 _KNOWN = 1e-3  # rad, error of the direction of a slip from which on its law says nothing
 _DIRECTION = 3.0  # errors of that direction that are allowed
@@ -47,15 +47,17 @@ def slide_of(contact: PairContact, pieces: BodyPoses, place: Array) -> Array:
     return velocity_at(pieces, contact.a, place) - velocity_at(pieces, contact.b, place)
 
 
-def slip_of_ball(contact: PairContact, pieces: BodyPoses) -> Array:
-    """Slip of a ball, a corner or an end on another shape, by poses alone [m/s]."""
-    ball, other, body, base = contact.shape_a, contact.shape_b, contact.a, contact.b
-    if ball.kind != "sphere":
-        ball, other, body, base = other, ball, base, body
-    pose, centre = (pieces.p[..., base, :], pieces.R[..., base, :, :]), pieces.p[..., body, :]
-    centre = centre + turned(pieces.R[..., body, :, :], ball.centre)
-    normal = turned(pose[1], near(other, seen_from(pose, centre))[1])
-    slide = slide_of(contact, pieces, centre - ball.radius * normal)
+def slip_of(contact: PairContact, pieces: BodyPoses) -> Array:
+    """Slip of a ball on another shape, or of a shape on a plane, by poses alone [m/s]."""
+    shape, other, body, base = contact.shape_a, contact.shape_b, contact.a, contact.b
+    if shape.kind == "plane" or (other.kind != "plane" and shape.kind != "sphere"):
+        shape, other, body, base = other, shape, base, body
+    pose, (p, R) = (
+        (pieces.p[..., base, :], pieces.R[..., base, :, :]),
+        (pieces.p[..., body, :], pieces.R[..., body, :, :]),
+    )
+    normal = turned(pose[1], near(other, seen_from(pose, p + turned(R, shape.centre)))[1])
+    slide = slide_of(contact, pieces, p + turned(R, lowest(shape, turned_back(R, normal))))
     return np.asarray(slide - dot(slide, normal)[..., None] * normal)
 
 

@@ -64,6 +64,11 @@ class BodyPoses:
     coarse: bool = False
     turns: Array | None = None
 
+    def at(self, chosen: Any, turns: Array | None = None) -> BodyPoses:
+        """Chosen points of the pieces, as an index of both; ``turns``: there."""
+        arrays = {name: getattr(self, name)[chosen] for name in ("time", "pace", "p", "R", "v", "w")}
+        return BodyPoses(**arrays, turns=turns)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Pieces(BodyPoses):

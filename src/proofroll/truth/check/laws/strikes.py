@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 from proofroll.truth.check.laws.contacts import gap_of
 from proofroll.truth.check.laws.integrals import TO_SERIES
 from proofroll.truth.check.laws.motion import Turns, changed_velocity
-from proofroll.truth.check.laws.record import Array, BodyPoses, PublishedEvent, PublishedValues
+from proofroll.truth.check.laws.record import Array, PublishedEvent, PublishedValues
 from proofroll.truth.check.laws.residuals import STRUCK, LawResiduals
-from proofroll.truth.check.laws.samples import NOISE, kinetic_energy
+from proofroll.truth.check.laws.samples import NOISE
 from proofroll.truth.check.laws.scene import LawScene
 from proofroll.truth.check.laws.tiles import Tiles
 from proofroll.truth.check.laws.values import energy_of
 
-_ARRAYS = ("time", "pace", "p", "R", "v", "w")
 _BESIDE = 1e-13  # time between an event and the border of its stretches, relative to it and to a second
 _ROUND = 1e-11  # part of the natural energy and length by which a value beside an impact may be off
 _BEGINS: Array = (-1.0) ** np.arange(len(TO_SERIES)) * -(np.arange(len(TO_SERIES)) ** 2) @ TO_SERIES
@@ -43,12 +42,11 @@ def strikes_follow(
         if scene.contacts and chosen.size and name not in values:
             residuals.note("strike", name, np.ones((1, 1)), 1.0, tiles.time[:1, :1])
         elif name in values and chosen.size:
-            arrays = {key: getattr(tiles, key)[chosen][:, [point]] for key in _ARRAYS}
             whole = np.zeros((len(chosen), 1, len(scene.mechanism.joints), 2))
             for (joint, k), coordinates in turns.items():
                 whole[:, 0, joint, k] = coordinates[chosen, point]
-            moving = BodyPoses(**arrays, turns=whole)
-            energy, size = energy_of(scene, moving, kinetic_energy(scene, moving))
+            moving = tiles.at(np.ix_(chosen, [point]), whole)
+            energy, size = energy_of(scene, moving)
             off = values[name][numbers][:, None] - energy
             residuals.note("strike", name, off, size + scene.mass.sum() * scene.speed**2, moving.time, bars[name])
     together = near.sum(0)

@@ -191,8 +191,8 @@ def gap(a: SurfaceShape, b: SurfaceShape, A: Pose, B: Pose) -> Array:
         a, b, A, B = b, a, B, A
     if b.kind == "plane":
         normal = turned(B[1], b.axis)
-        lowest = A[0] + turned(A[1], _lowest(a, turned_back(A[1], normal)))
-        return dot(normal, lowest - B[0] - turned(B[1], b.centre))
+        place = A[0] + turned(A[1], lowest(a, turned_back(A[1], normal)))
+        return dot(normal, place - B[0] - turned(B[1], b.centre))
     if a.kind == "sphere":
         return near(b, seen_from(B, A[0] + turned(A[1], a.centre)))[0] - a.radius
     if a.kind == b.kind == "box":
@@ -212,7 +212,7 @@ def gap(a: SurfaceShape, b: SurfaceShape, A: Pose, B: Pose) -> Array:
     return np.asarray(np.min([away(part) for part in (low, high, (low + high) / 2)], 0)) - a.radius
 
 
-def _lowest(shape: SurfaceShape, normal: Array) -> Array:
+def lowest(shape: SurfaceShape, normal: Array) -> Array:
     """Place of a convex shape that lies lowest along directions, in the frame of the body."""
     if shape.kind == "ellipsoid":
         y = turned_back(shape.frame, normal) * shape.half

@@ -61,12 +61,16 @@ class Tiles(BodyPoses):
 
     def holding(self, times: Array) -> Places:
         """Places of times [s] in the tiles that hold them; of two that meet there the later."""
-        begins = self.time[:, 0]
-        tile = np.clip(np.searchsorted(begins, times * (1 + _LATER), side="right") - 1, 0, len(begins) - 1)
+        begins, spans = self.time[:, 0], self.time[:, -1] - self.time[:, 0]
+        now, later = (
+            np.clip(np.searchsorted(begins, times * (1 + part), side="right") - 1, 0, len(begins) - 1)
+            for part in (0.0, _LATER)
+        )
+        tile = np.where(begins[later] - times <= (_OUTSIDE - 1) / 2 * spans[later], later, now)
         room = _LATER * (1 + np.abs(times))
         inside = self.resolved[tile] & (times >= begins[tile] - room) & (times <= self.time[tile, -1] + room)
         series = self.time[tile] @ TO_SERIES.T
-        span = self.time[tile, -1] - begins[tile]
+        span = spans[tile]
         place = np.divide(2 * (times - begins[tile]), span, out=np.zeros_like(times), where=span > 0) - 1
         for _ in range(_CORRECTIONS):
             powers = _vandermonde(np.clip(place, -_OUTSIDE, _OUTSIDE))

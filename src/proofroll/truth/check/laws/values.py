@@ -13,6 +13,7 @@ from proofroll.truth.check.laws.joints import coordinate_of
 from proofroll.truth.check.laws.loads import bushing_load, rotation_vector, spring_ends, spring_pull
 from proofroll.truth.check.laws.record import Array, BodyPoses, PublishedValues
 from proofroll.truth.check.laws.residuals import LawResiduals
+from proofroll.truth.check.laws.samples import kinetic_energy
 from proofroll.truth.check.laws.scene import LawScene
 
 _PART = 1e-3  # part of a natural size that counts in the size of a value
@@ -25,12 +26,10 @@ _RESIDUALS: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
-def values_follow(
-    scene: LawScene, published: PublishedValues, residuals: LawResiduals, kinetic: tuple[Array, Array]
-) -> None:
-    """Checks values at samples; ``kinetic``: kinetic energy and that of gravity, and their sizes [J]."""
+def values_follow(scene: LawScene, published: PublishedValues, residuals: LawResiduals, begun: BodyPoses) -> None:
+    """Checks values at samples; ``begun``: motion from the start, or as soon as it is known."""
     _coordinates(scene, published, residuals)
-    _energies(scene, published, residuals, kinetic)
+    _energies(scene, published, residuals, begun)
     _points(scene, published, residuals)
     _links(scene, published, residuals)
     _contacts(scene, published, residuals)
@@ -59,9 +58,9 @@ def _coordinates(scene: LawScene, published: PublishedValues, residuals: LawResi
             residuals.note("value", f"{name}.{joint.name}", off, size + np.abs(value), pieces.time)
 
 
-def energy_of(scene: LawScene, pieces: BodyPoses, kinetic: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Energy, and the sizes of its parts [J], from kinetic energy and that of gravity; ``pieces`` tell whole turns."""
-    m, (total, size) = scene.mechanism, kinetic
+def energy_of(scene: LawScene, pieces: BodyPoses) -> tuple[Array, Array]:
+    """Energy, and the sizes of its parts [J]; ``pieces`` tell whole turns."""
+    m, (total, size) = scene.mechanism, kinetic_energy(scene, pieces)
     size = size + _PART * scene.mass.sum() * scene.speed**2
     for spring in m.springs:
         ends = spring_ends(scene, pieces, spring)
@@ -91,18 +90,17 @@ def energy_of(scene: LawScene, pieces: BodyPoses, kinetic: tuple[Array, Array]) 
     return total, size
 
 
-def _energies(
-    scene: LawScene, published: PublishedValues, residuals: LawResiduals, kinetic: tuple[Array, Array]
-) -> None:
+def _energies(scene: LawScene, published: PublishedValues, residuals: LawResiduals, begun: BodyPoses) -> None:
     """Energy is kinetic, of gravity, and of springs."""
     pieces = published.pieces
-    total, size = energy_of(scene, pieces, kinetic)
+    total, size = energy_of(scene, pieces)
     energy = published.values["energy"][:, None]
     residuals.note("value", "energy", energy - total, size, pieces.time)
     for name in ("energy_error", "energy_change"):
-        if name in published.values and pieces.time[0, 0] <= 0:
-            off = published.values[name][:, None] - (energy - energy[:1])
-            residuals.note("value", name, off, size, pieces.time)
+        if name in published.values and begun.time[0, 0] <= 0:
+            first, size_then = energy_of(scene, begun)
+            off = published.values[name][:, None] - (energy - first[:1])
+            residuals.note("value", name, off, size + size_then[:1], pieces.time)
 
 
 def _points(scene: LawScene, published: PublishedValues, residuals: LawResiduals) -> None:

@@ -122,7 +122,9 @@ def kept_laws(mechanism: Mechanism) -> frozenset[str]:
     ends |= {name for loop in mechanism.loops for name in (loop.body_a, loop.body_b)}
     held = any(joint.kind != JointKind.FREE and "world" in {joint.parent, joint.child} for joint in mechanism.joints)
     held = held or "world" in ends or bool(np.any(mechanism.gravity))
-    return frozenset(name for name, _, _ in (LAWS[:1] if held else LAWS))
+    # resistance against motion with an arm longer than that of friction feeds more into a back spin than friction takes
+    fed = any(contact.rolling_resistance * abs(contact.bend) > contact.friction for contact in mechanism.contacts)
+    return frozenset(name for name, _, _ in LAWS[fed : 1 if held else None])
 
 
 def event_observables(mechanism: Mechanism) -> Iterator[Observable]:
