@@ -41,9 +41,10 @@ _ROWS = 5  # rows whose accelerations are computed
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEW = 150  # equations by which a scheme that is rare is looked at first
 _UNKNOWN = 3.0  # times what half an interval makes that steps between rows may make: efforts jump at instants
-_HALF = 0.5  # part of what the right numbers leave that several together may leave
+_FEW_BARS = 3.0  # bars of rounding up to which what the right numbers leave accuses nothing
 _BOUND = 0.05  # part of the rows at which friction is at its bound, at least
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
+_SOFT = "dry friction within its bounds explains it, as that of MuJoCo, which is soft: no other cause is decided"
 
 
 class _Trial(NamedTuple):
@@ -68,7 +69,7 @@ class AirFit:
             more as well.
         tried: number of numbers and bodies that were tried.
         between: True if more than rounding is left, which no cause explains and steps between the rows may.
-        softened: True if dry friction that stays within its bound explains it, as that of MuJoCo below its bound does.
+        hidden: clause on what hides every cause, soft friction or the digits of the record; empty: nothing does.
     """
 
     off: float
@@ -78,7 +79,7 @@ class AirFit:
     imitated: bool = False
     tried: int = 0
     between: bool = False
-    softened: bool = False
+    hidden: str = ""
 
     @property
     def left(self) -> float:
@@ -166,26 +167,30 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
         imitated = scheme.implicit and bool(armed)
         damped = scheme.damped and bool(robot.damping.any())
         return AirFit(best.off * scale, SAFETY * best.rounding * scale, damped=damped, imitated=imitated)
+    bar = SAFETY * best.rounding
+    hidden = _SOFT if any(_softened(item.rows, law, robot) for item in trials) else ""
+    if best.off <= _FEW_BARS * bar:
+        few = f"that is no more than {_FEW_BARS:.0f} times what the record's digits make, {error(bar * scale)}"
+        hidden = hidden or f"{few}: log more digits to decide"
+    if hidden:
+        return AirFit(best.off * scale, bar * scale, hidden=hidden)
     right = LayerCause("", "", None, best.off * scale)  # what no cause may leave, whatever the scheme
     causes: dict[str, LayerCause] = {}
     for trial in trials:
         for cause in _causes(trial.rows, law):
             if cause.after < causes.get(cause.id, right).after:
                 causes[cause.id] = cause
-    bar = SAFETY * best.rounding
     closed = any(cause.after <= bar * scale for cause in causes.values())  # by one of them to rounding
     several = [cause for cause in causes.values() if cause.after <= bar * scale or not closed]
     named = sorted(several, key=lambda cause: cause.after)
     if together and not closed:
         likely = [rows for item, rows, hopeful in trials if hopeful and not item.stages]
         sets = [several_causes(rows, law.joints, right_numbers(law)) for rows in likely]
-        halving = [found for found in sets if found and found[0].after <= _HALF * right.after]
-        named = min(halving, key=len, default=named)
+        named = min(filter(None, sets), key=len, default=named)
     # The steps of the program may be no rows.
     between = not named and bar < best.off <= _UNKNOWN * min(item.rows.unknown for item in trials)
     tried = len(NUMBERS) + len(best.added)
-    softened = not named and any(_softened(item.rows, law, robot) for item in trials)
-    return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between, softened=softened)
+    return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between)
 
 
 def _softened(rows: AirRows, law: ControlLaw, robot: AirRobot) -> bool:
@@ -280,7 +285,9 @@ def standing_fit(
     usable = off_stops & off_friction
     if remarks:
         fit = acceleration_fit(record, law, held, efforts, steady, usable)
-    if isinstance(fit, str) or (_differs(fit) and (len(fit.causes) != 1 or fit.causes[0].id == FITTED)):
+    if isinstance(fit, str) or (
+        _differs(fit) and not fit.hidden and (len(fit.causes) != 1 or fit.causes[0].id == FITTED)
+    ):
         motors = _held_joints(record, law, held, efforts, off_stops)
         if motors is not None:
             return StandingFit(replace(whole, causes=(motors,), between=False), every, "")

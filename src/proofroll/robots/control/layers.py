@@ -68,7 +68,6 @@ from proofroll.robots.model import Array
 
 # Remark on a scheme that has the damping of joints at the velocity after a step.
 _DAMPED = "damping of joints acts at the velocity after the step, or they have an armature of h times it more"
-_SOFTENED = "dry friction within its bounds explains it, as that of MuJoCo, which is soft: no other cause is decided"
 # Number of random roundings of a record that give the bar of a layer, and the factor on their largest change.
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
@@ -227,8 +226,8 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     white = white_noise(record, efforts=not floats) if looked_at else None
     smoothed = noisy_layer(record, law, evidence.in_air.held, off) if white is not None and not floats else None
     noise = noise_of_states(record) if looked_at and white is None else None
-    if smoothed is None and (fit.softened or noise is not None):
-        why, part = (_SOFTENED, 0.0) if noise is None else (f"{noise.words} may hide a cause", noise.part)
+    if smoothed is None and ((fit.hidden and fit.bar < 1) or noise is not None):
+        why, part = (fit.hidden, fit.off) if noise is None else (f"{noise.words} may hide a cause", noise.part)
         smoothed = Layer("acceleration", reason=f"{off}; {why}", undecided=True, noise=part)
     if smoothed is not None:
         return smoothed
