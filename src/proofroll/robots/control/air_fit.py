@@ -42,6 +42,7 @@ _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEW = 150  # equations by which a scheme that is rare is looked at first
 _UNKNOWN = 3.0  # times what half an interval makes that steps between rows may make: efforts jump at instants
 _FEW_BARS = 3.0  # bars of rounding up to which what the right numbers leave accuses nothing
+_STAGED = 0.05  # part of what the right numbers leave that friction may leave over the stages of a step
 _BOUND = 0.05  # part of the rows at which friction is at its bound, at least
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
 _SOFT = "dry friction within its bounds explains it, as that of MuJoCo, which is soft: no other cause is decided"
@@ -135,6 +136,7 @@ def acceleration_fit(
                     break
                 begun = table.rows(first, rated, scheme, central=central) if trials or not together else None
                 hopeful = begun is None or _promising(begun, law, together=together)
+                hopeful = hopeful or (scheme.stages and _softened(_Trial(scheme, begun, False), law, robot))
                 if not hopeful and (scheme in rarer or not together):
                     continue
                 trials.append(_Trial(scheme, table.rows(rows, rated, scheme, central=central), hopeful))
@@ -168,7 +170,7 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
         damped = scheme.damped and bool(robot.damping.any())
         return AirFit(best.off * scale, SAFETY * best.rounding * scale, damped=damped, imitated=imitated)
     bar = SAFETY * best.rounding
-    hidden = _SOFT if any(_softened(item.rows, law, robot) for item in trials) else ""
+    hidden = _SOFT if any(_softened(item, law, robot) for item in trials) else ""
     if best.off <= _FEW_BARS * bar:
         few = f"that is no more than {_FEW_BARS:.0f} times what the record's digits make, {error(bar * scale)}"
         hidden = hidden or f"{few}: log more digits to decide"
@@ -193,11 +195,13 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
     return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between)
 
 
-def _softened(rows: AirRows, law: ControlLaw, robot: AirRobot) -> bool:
+def _softened(trial: _Trial, law: ControlLaw, robot: AirRobot) -> bool:
     """True if dry friction within its bounds, and at them at some rows, leaves no more than rounding.
 
     MuJoCo's friction is a soft row: below its bound it is a force by the velocity and the acceleration of its joint.
+    Over the stages of RK4 it changes, so that its mean goes beyond by a part of what half an interval makes.
     """
+    rows, staged = trial.rows, trial.scheme.stages
     bounds = {joint.name: joint.friction for joint in robot.mechanism.joints}
     friction = np.array([bounds[name] for name in law.joints])
     rubbing = friction > 0
@@ -205,12 +209,15 @@ def _softened(rows: AirRows, law: ControlLaw, robot: AirRobot) -> bool:
         return False
     rows = rows.without(rows.slow) if rows.slow.any() and not rows.slow.all() else rows
     columns = rows.by_joint["friction"][:, rubbing].reshape(-1, rows.freedoms, np.count_nonzero(rubbing))
-    more = np.einsum("rij,rj->ri", np.linalg.pinv(columns), rows.left.reshape(-1, rows.freedoms))
+    inverse = np.linalg.pinv(columns)
+    more, late = (np.einsum("rij,rj->ri", inverse, item.reshape(-1, rows.freedoms)) for item in (rows.left, rows.late))
     sizes = np.linalg.norm(columns, axis=1)
     near = SAFETY * rows.rounding / sizes[sizes > 0].min(initial=np.inf) + ROUND_OFF
-    within = np.all((more <= near) & (more >= -2 * friction[rubbing] - near))
+    beyond = near + staged * np.abs(late)
+    within = np.all((more <= beyond) & (more >= -2 * friction[rubbing] - beyond))
     left = rows.left - np.einsum("rij,rj->ri", columns, more).ravel()
-    return bool(within and rows.rounded(left) and np.mean(np.abs(more) <= near) >= _BOUND)
+    closed = rows.rounded(left) or (staged and rms(left) <= _STAGED * rows.off)
+    return bool(within and closed and np.mean(np.abs(more) <= near) >= _BOUND)
 
 
 def _causes(rows: AirRows, law: ControlLaw) -> list[LayerCause]:

@@ -211,10 +211,10 @@ def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
     compared = measured(reading.record)
     if compared is None:
         return reading
-    lag, rounding = compared.lag_fit(), compared.rounding / np.sqrt(3)
+    lag, rounding, distance = compared.lag_fit(), compared.rounding / np.sqrt(3), compared.off()
     rows = 1 if lag.intervals > 0 else -1
     record = _moved(f"{name}.", rows, reading.record)
-    right = measured(record) if len(record.time) > _FEWEST else None
+    right = measured(record) if len(record.time) > _FEWEST and distance.off > _SURE * distance.rounding else None
     if right is None:
         return reading
     rest = right.lag_fit()
@@ -223,7 +223,7 @@ def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
     explained = rest.rest <= max(2 * rounding, _HELPS * lag.size)
     if not explained or abs(lag.intervals) <= _OF_SCHEMES + bar or abs(rest.intervals) > _OF_SCHEMES + bar:
         return reading
-    distance, remainder = compared.off(), right.off()
+    remainder = right.off()
     words = f"{_NAMES.get(name, name)} is one row {'late' if rows > 0 else 'early'}"
     text, interval = with_bar(abs(lag.intervals), bar, 1)
     proof = f"places off by {error(distance.off)}, by {error(remainder.off, 1)} with that; {text} ± {interval} rows"

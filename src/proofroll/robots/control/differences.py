@@ -78,6 +78,22 @@ def _instant_rows(record: ControlRecord, rate: float) -> Any:
     return np.concatenate([[0], later])
 
 
+@lru_cache(maxsize=16)
+def _passed(record: ControlRecord, rate: float) -> str:
+    """Reason why a record does not show what is at instants: its rows pass between them; empty: they do not.
+
+    Each change is then at the first row after an instant.
+    """
+    numbers = record.time * rate
+    passing = np.diff(np.floor(numbers + SAME_TIME)) > 0
+    at_rows = np.abs(numbers - np.round(numbers)) < SAME_TIME
+    rows = _instant_rows(record, rate)
+    if at_rows[1:][passing].all() or not passing[rows[rows > 0] - 1].all():
+        return ""
+    every = float(np.diff(record.time).mean())
+    return f"rows every {every:.4g} s pass the controller's instants, every {1 / rate:.4g} s: log a row at each"
+
+
 def due_rows(record: ControlRecord, law: ControlLaw) -> Any:
     """Rows at instants of a law at which the action, or the target, should change but for rounding."""
     begin = record.time[instant_rows(record, law)[0]]  # a clock may begin at any time
@@ -274,6 +290,8 @@ def servo_rows(record: ControlRecord, law: ControlLaw) -> tuple[Array, Array, Ar
         return "the record has no columns q.JOINT and v.JOINT"
     target, rows, instants = record.stacked("target", law.joints), np.arange(len(q)), instant_rows(record, law)
     places = np.searchsorted(instants, rows, side="right") - 1
+    if (target is None or law.hold_effort) and (passed := _passed(record, law.rate)):
+        return passed
     if target is None:
         if record.time[0] != 0 or (law.policy is None and not _of_instants(record) and not len(instants)):
             return "the record has no columns target.JOINT"
@@ -293,12 +311,20 @@ def _effort(record: ControlRecord, law: ControlLaw) -> LayerDifferences | str:
     return _of_joints("effort", record, law, recorded, efforts_of(record, law))
 
 
+_Differences = Callable[[ControlRecord, ControlLaw], LayerDifferences | str]
+
+
+def _there(difference: _Differences) -> _Differences:
+    """Differences at instants, of a record whose rows do not pass between them."""
+    return lambda record, law: _passed(record, law.rate) or difference(record, law)
+
+
 # Layer -> its differences, or the reason why there are none.
-DIFFERENCES: Mapping[str, Callable[[ControlRecord, ControlLaw], LayerDifferences | str]] = {
-    "instants": _instants,
-    "observation": _observation,
-    "action": _action,
-    "target": _target,
+DIFFERENCES: Mapping[str, _Differences] = {
+    "instants": _there(_instants),
+    "observation": _there(_observation),
+    "action": _there(_action),
+    "target": _there(_target),
     "effort": _effort,
 }
 

@@ -198,10 +198,12 @@ def _layer(name: str, evidence: _Evidence, skipped: Collection[str], time: Searc
         column=compared.columns[column],
         time=float(compared.time[row]),
     )
-    noise = None if layer.holds or name == "instants" else noise_of_states(evidence.record)
+    noise = None if layer.holds else noise_of_states(evidence.record)
     if noise is not None:
+        changes = len(instant_rows(evidence.record, evidence.law)) - 1  # the others should change but for noise
         noisy = _bars(name, dataclasses.replace(evidence, record=noise.record), compared)
-        if np.all(np.abs(compared.difference) <= noisy + noise_beside(compared.difference)):
+        seen = compared.difference[: changes if name == "instants" else None]
+        if np.all(np.abs(seen) <= noisy + noise_beside(seen)):
             reason = f"off by {error(float(np.abs(compared.difference).max()))}, which {noise.words} may make"
             return Layer(name, reason=reason, undecided=True, noise=noise.part)
     causes = {} if layer.holds else _explained(name, compared, bars, skipped, evidence, time)
@@ -222,28 +224,26 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
     floats, off = "q_WB.w" in record.columns, f"the forces are off by {error(fit.off)} of the largest"
-    looked_at = fit.off > fit.bar and (floats or not fit.causes)
-    white = white_noise(record, efforts=not floats) if looked_at else None
+    white = white_noise(record, efforts=not floats) if fit.off > fit.bar else None
     smoothed = noisy_layer(record, law, evidence.in_air.held, off) if white is not None and not floats else None
-    noise = noise_of_states(record) if looked_at and white is None else None
+    noise = noise_of_states(record) if fit.off > fit.bar and white is None else None
     if smoothed is None and ((fit.hidden and fit.bar < 1) or noise is not None):
         why, part = (fit.hidden, fit.off) if noise is None else (f"{noise.words} may hide a cause", noise.part)
         smoothed = Layer("acceleration", reason=f"{off}; {why}", undecided=True, noise=part)
     if smoothed is not None:
         return smoothed
-    if fit.off > fit.bar and not (white and floats) and all(cause.id == FITTED for cause in fit.causes):
+    if fit.off > fit.bar and white is None and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
     fit = dataclasses.replace(fit, between=fit.between and not (stepwise or rows_are_steps(record, law)))
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
-    hidden = white if floats or not fit.causes else None
-    if fit.between or hidden is not None:
+    if fit.between or white is not None:
         advice = f"steps between the rows may explain it: {assumed or 'log every step to decide'}"
-        if hidden is not None:
-            advice = f"white noise of up to {error(100 * hidden.part, 1)} % of a range may hide one"
+        if white is not None:
+            advice = f"white noise of up to {error(100 * white.part, 1)} % of a range may hide one"
         reason = "; ".join(filter(None, (f"{off}, and no cause is known", advice, remark)))
-        return Layer("acceleration", reason=reason, undecided=True, noise=0.0 if hidden is None else hidden.part)
+        return Layer("acceleration", reason=reason, undecided=True, noise=0.0 if white is None else white.part)
     implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
     holds = fit.off <= fit.bar and not fit.causes
     if assumed and not holds and all(cause.after > fit.bar for cause in fit.causes):
