@@ -136,7 +136,8 @@ def acceleration_fit(
                     break
                 begun = table.rows(first, rated, scheme, central=central) if trials or not together else None
                 hopeful = begun is None or _promising(begun, law, together=together)
-                hopeful = hopeful or (scheme.stages and _softened(_Trial(scheme, begun, False), law, robot))
+                if begun is not None and scheme.stages:
+                    hopeful |= _softened(_Trial(scheme, begun, hopeful), law, robot)
                 if not hopeful and (scheme in rarer or not together):
                     continue
                 trials.append(_Trial(scheme, table.rows(rows, rated, scheme, central=central), hopeful))

@@ -108,6 +108,7 @@ class AirForces(NamedTuple):
         weight: (nv).
         free: directions that loops and couplings allow, (nv, freedoms).
         motion: of the bodies.
+        pushes: velocities of the bodies' centres along the world's axes for each velocity, (bodies, 3, nv).
     """
 
     mass: Array
@@ -115,6 +116,7 @@ class AirForces(NamedTuple):
     weight: Array
     free: Array
     motion: BodyMotion
+    pushes: Array
 
 
 class AirRobot:
@@ -189,7 +191,7 @@ class AirRobot:
         rank = self.equations.rank
         free = np.linalg.svd(solution.rows.C)[2][rank:].T if rank else np.eye(len(M))
         inertial = M @ solution.acceleration - weight
-        return AirForces(mass=M, inertial=inertial, weight=weight, free=free, motion=solution.motion)
+        return AirForces(M, inertial, weight, free, solution.motion, J[:, :3])
 
     def coordinates(self, q: Array, v: Array, base: Array | None) -> tuple[Array, Array]:
         """Coordinates and velocities of the mechanism.
