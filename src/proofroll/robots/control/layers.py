@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -73,6 +74,7 @@ _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
 _HELPS = 0.1
 _FIRST = 12  # instants of a long record at which mistakes are tried before all of it
+_SIZE = re.compile(r"(?<=is )\S+( ± \S+)?(?= of the right one)")  # size of a cause, which two fits find apart
 _INSTANTS = 4  # least number of rows from which a pose is fitted beside another mistake
 
 
@@ -346,7 +348,9 @@ def _explained(
         ranked += [((1 + cause.numbers) * cause.after, cause) for cause in fits]  # a number takes away as much again
     by_words: dict[str, LayerCause] = {}
     for _, cause in sorted(ranked, key=lambda item: item[0]):
-        by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
+        words = _SIZE.sub("", cause.sentence)
+        if "±" in cause.sentence or words not in by_words:  # a sign is a size of -1, too
+            by_words[words] = cause
     causes = [*by_words.values()]
     if name == "instants":
         closing = [cause for cause in causes if cause.after <= rounding]

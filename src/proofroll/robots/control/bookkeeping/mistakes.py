@@ -192,6 +192,10 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
         point = f"{velocity} observed at its centre of mass"
         yield _seen("velocity_point", point, at_centre=True)
         yield _seen("velocity_point", f"{point}, in the base's axes", at_centre=True, velocity_turns=1)
+    steps = (1 / law.rate, -1 / law.rate)
+    yield _sized(
+        "clock", "the clock of the policy is off by {size} s", "observation", _ahead, steps, none=0.0, later=True
+    )
     for part, words in ((-1.0, "relative to the default pose"), (1.0, "with the default pose added")):
         if law.pose.any():
             yield _seen("observed_pose", f"coordinates are observed {words}", pose_observed=part)
@@ -255,6 +259,10 @@ def _with_factor(place: int, law: ControlLaw, size: float) -> ControlLaw:
 
 def _armed(law: ControlLaw, size: float) -> ControlLaw:
     return law.change(armature=law.armature + size)
+
+
+def _ahead(law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(clock=size)
 
 
 def _clipped(law: ControlLaw, size: float) -> ControlLaw:
