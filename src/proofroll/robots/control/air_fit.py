@@ -135,9 +135,7 @@ def acceleration_fit(
                 if scheme in rarer and any(item.rows.exact for item in trials):
                     break
                 begun = table.rows(first, rated, scheme, central=central) if trials or not together else None
-                hopeful = begun is None or _promising(begun, law, together=together)
-                if begun is not None and scheme.stages:
-                    hopeful |= _softened(_Trial(scheme, begun, hopeful), law, robot)
+                hopeful = begun is None or _promising(_Trial(scheme, begun, True), law, robot, together=together)
                 if not hopeful and (scheme in rarer or not together):
                     continue
                 trials.append(_Trial(scheme, table.rows(rows, rated, scheme, central=central), hopeful))
@@ -155,9 +153,10 @@ def _spread(rows: Any, most: int) -> Any:
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
 
 
-def _promising(rows: AirRows, law: ControlLaw, *, together: bool) -> bool:
+def _promising(trial: _Trial, law: ControlLaw, robot: AirRobot, *, together: bool) -> bool:
     """True if a scheme may explain a record by what it leaves at a few rows, with or without a cause."""
-    return rows.exact or bool(_causes(rows, law)) or (together and may_be_explained(rows, law.joints))
+    rows, softened = trial.rows, trial.scheme.stages and _softened(trial, law, robot)
+    return rows.exact or softened or bool(_causes(rows, law)) or (together and may_be_explained(rows, law.joints))
 
 
 def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, together: bool) -> AirFit:
@@ -286,8 +285,15 @@ def standing_fit(
     if isinstance(whole, str) or not _differs(whole):
         return StandingFit(whole, every, "")
     fit: AirFit | str = whole
-    off_stops, at_stops = _rows_without(_at_ends(record, ranges), record.time)
-    off_friction, at_rest = _rows_without(_at_rest(record, held), record.time)
+    at_ends = {}
+    for joint, (lower, upper) in ranges.items():
+        near = _NEAR * (upper - lower)
+        if (q := record.columns.get(f"q.{joint}")) is not None:
+            at_ends[f"q.{joint}"] = (q <= lower + near) | (q >= upper - near)
+    off_stops, at_stops = _rows_without(at_ends, record.time)
+    rubbing = [f"v.{joint.name}" for joint in held.mechanism.joints if joint.friction]
+    still = {name: np.abs(record.columns[name]) <= record.rounding[name] for name in rubbing if name in record.columns}
+    off_friction, at_rest = _rows_without(still, record.time)
     remarks = [f"rows at an end of the range of a joint are left out: {at_stops}"] if at_stops else []
     remarks += [f"rows at which dry friction may hold a joint are left out: {at_rest}"] if at_rest else []
     usable = off_stops & off_friction
@@ -307,22 +313,6 @@ def _differs(fit: AirFit) -> bool:
     return fit.off > fit.bar or fit.bar >= 1
 
 
-def _at_ends(record: ControlRecord, ranges: Mapping[str, tuple[float, float]]) -> dict[str, NDArray[np.bool_]]:
-    """Column of each joint -> True at rows at which it is at an end of its range, or beyond it."""
-    ends = {}
-    for joint, (lower, upper) in ranges.items():
-        near = _NEAR * (upper - lower)
-        if (q := record.columns.get(f"q.{joint}")) is not None:
-            ends[f"q.{joint}"] = (q <= lower + near) | (q >= upper - near)
-    return ends
-
-
-def _at_rest(record: ControlRecord, held: HeldRobot) -> dict[str, NDArray[np.bool_]]:
-    """Column of each joint with dry friction -> True at rows at which it does not move."""
-    names = [f"v.{joint.name}" for joint in held.mechanism.joints if joint.friction]
-    return {name: np.abs(record.columns[name]) <= record.rounding[name] for name in names if name in record.columns}
-
-
 def _rows_without(held: Mapping[str, NDArray[np.bool_]], time: Array) -> tuple[NDArray[np.bool_], str]:
     """True at rows from which on no joint is held, (times,), and the first column that is, with its time, if any."""
     free = np.ones(len(time), bool)
@@ -333,15 +323,6 @@ def _rows_without(held: Mapping[str, NDArray[np.bool_]], time: Array) -> tuple[N
         return free, ""
     further = f" and {len(names) - 1} more" if len(names) > 1 else ""
     return free, f"{names[0]}, first at {time[int(np.argmax(held[names[0]]))]:.4g} s{further}"
-
-
-def _least_rates(robot: AirRobot, state: tuple[Array, Array], efforts: Array, friction: Array) -> Array:
-    """Sizes of the accelerations of driven joints that dry friction, (nv,), leaves at least."""
-    rates = np.abs(robot.equations.solve(*state, load=robot.load(efforts)).acceleration)
-    if friction.any():
-        M = robot.equations.inertial(robot.equations.tree.at(*state))[1]
-        rates = rates - np.abs(np.linalg.inv(M)) @ friction
-    return np.asarray(rates[robot.driven[:, 1]])
 
 
 def _held_joints(
@@ -359,11 +340,17 @@ def _held_joints(
         return None
     step = float(np.diff(record.time).mean())
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, _ROWS).astype(int))]
-    friction = np.zeros(mechanism.nv)
+    friction, rates = np.zeros(mechanism.nv), list[Array]()
     for joint, at_v in zip(mechanism.joints, mechanism.v_slices, strict=True):
         friction[at_v] = joint.friction
     try:
-        rates = [_least_rates(robot, motion[row], efforts[row], friction) for row in rows.tolist()]
+        for row in rows.tolist():
+            q, v = motion[row]
+            rate = np.abs(robot.equations.solve(q, v, load=robot.load(efforts[row])).acceleration)
+            if friction.any():
+                M = robot.equations.inertial(robot.equations.tree.at(q, v))[1]
+                rate = rate - np.abs(np.linalg.inv(M)) @ friction
+            rates.append(rate[robot.driven[:, 1]])  # what dry friction leaves at least
     except (Diverged, Refused, np.linalg.LinAlgError):
         return None
     changes = step * np.array(rates).max(axis=0)

@@ -360,8 +360,8 @@ class AirTable:
         columns["armature"] = by_joint["armature"] @ (law.armature if law.armature.any() else np.ones(len(driven)))
         columns["implicit"] = by_joint["armature"] @ (h * law.kd)
         named = [body.name for body in robot.mechanism.bodies]
-        bodies, pushes = -np.moveaxis(self._of_bodies(forces, rate), 1, 0), self._pushes(forces)
-        size = rms(whitened(masses - inner))
+        bodies = -np.moveaxis(self._of_bodies(forces, rate), 1, 0)
+        pushes = np.array([item.pushes for item in forces]).transpose(1, 0, 3, 2)
         return AirRows(
             left=whitened(acting),
             columns=columns,
@@ -370,16 +370,10 @@ class AirTable:
             pushed={name: whitened(values) for name, values in zip(["", *named], pushes, strict=True)},
             rounding=rms(noise),
             late=whitened(np.einsum("tij,tj->ti", M, following - rate) / 2),
-            size=size if size > ROUND_OFF * rms(whitened(weight)) else 1.0,
+            size=size if (size := rms(whitened(masses - inner))) > ROUND_OFF * rms(whitened(weight)) else 1.0,
             slow=np.repeat(self.slow[rows], into.shape[1]),
             freedoms=into.shape[1],
         )
-
-    def _pushes(self, forces: Sequence[AirForces]) -> Array:
-        """Forces along the velocities that gravity of 1 m/s² needs, and 1 N at each body, (1 + bodies, rows, nv, 3)."""
-        pushes = np.array([item.pushes for item in forces]).transpose(1, 0, 3, 2)
-        masses = [body.mass for body in self.robot.mechanism.bodies]
-        return np.concatenate([np.tensordot(masses, pushes, 1)[None], pushes])
 
     def _drag(self, forces: Sequence[AirForces], v: Array) -> Array:
         """Forces along the velocities (rows, nv) that drag of 1 1/s on each link needs, (rows, nv)."""

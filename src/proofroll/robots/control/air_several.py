@@ -48,10 +48,8 @@ _EACH = 2  # equations for each number at least
 _SPREAD = 5.0  # standard deviations of a sum of squares within which numbers leave as little as all of them do
 _CLEAR, _SHARE = 10.0, 0.03  # least part of a number's forces that no others make: what is left of less is their noise
 _STRETCH, _TO_AND_FRO = 60, -0.25  # rows that show noise at least; correlation of its steps with the next ones at most
-_MEDIAN, _LARGEST = (
-    0.455,
-    6.0,
-)  # median of the square of a normal number; standard deviations of the largest of thousands
+_MEDIAN = 0.455  # median of the square of a normal number
+_LARGEST = 6.0  # standard deviations of the largest of thousands
 _EFFORTS = ("effort", "efforts")  # parts of the efforts that act, of all joints or of each
 _REST = "torque"  # number of a joint that a spring needs, too: its rest is not known
 
@@ -122,12 +120,9 @@ def _closing(groups: Sequence[_Group], rows: AirRows) -> Iterator[list[_Group]]:
     sets = [*itertools.combinations(groups, 1), *itertools.combinations(groups, 2)]
     if not _close(others, rows):
         sets = [chosen for chosen in sets if any(group.kind in _EFFORTS for group in chosen)]
-
-    def rank(chosen: tuple[_Group, ...]) -> tuple[bool, int]:
-        """Number of numbers, forces on bodies last: they make a constant torque, too."""
-        return any(group.kind == "push" for group in chosen), _columns(chosen).shape[1]
-
-    yield from ([*chosen] for chosen in sorted(sets, key=rank) if _close(chosen, rows))
+    sets.sort(key=lambda chosen: _columns(chosen).shape[1])
+    sets.sort(key=lambda chosen: any(group.kind == "push" for group in chosen))  # they make a constant torque, too
+    yield from ([*chosen] for chosen in sets if _close(chosen, rows))
 
 
 def _columns(groups: Sequence[_Group]) -> Array:

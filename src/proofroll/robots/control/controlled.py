@@ -204,7 +204,8 @@ class ControlledScenes:
         with error_location(str(self._path)):
             followers = {mimic.joint for mimic in robot.mimics} if values.get("couplings") else set()
             single = [joint.name for joint in robot.moving if joint.dofs == 1 and joint.name not in followers]
-            of_file = _servos_of_file(robot)
+            driven = (row for row in scene_actuators(robot)[0] if row["kind"] == "position" or "limit" in row)
+            of_file = {row["joint"]: row for row in driven}
             positions = {name for name, row in of_file.items() if row["kind"] == "position"}
             controller.require_joints(single, {joint.name: joint.kind for joint in robot.moving}, positions)
             actuators = _actuators(robot, controller, single, of_file, file.driven)
@@ -371,12 +372,6 @@ def start_of(file: RobotFile, robot: Robot, controller: Controller, *, placed: b
     return RobotStates(angle=angle, rotation=rotation, position=position, velocity=velocity, acceleration=rest)
 
 
-def _servos_of_file(robot: Robot) -> dict[str, dict[str, Any]]:
-    """Joint -> table of its position actuator in the file, or of another one that has a limit."""
-    rows = scene_actuators(robot)[0]
-    return {row["joint"]: row for row in rows if row["kind"] == "position" or "limit" in row}
-
-
 def _actuators(
     robot: Robot,
     controller: Controller,
@@ -445,7 +440,10 @@ def imported_robots(
         for causes, other_robot in changes:
             begun.append((causes, other_robot))
             with suppress(InputError, Refused):
-                ids, words = tuple(item.id for item in causes), "; ".join(_told(item) for item in causes)
+                ids = tuple(item.id for item in causes)
+                engines = (", ".join(" ".join(filter(None, known)) for known in item.known.items()) for item in causes)
+                told = zip(causes, engines, strict=True)
+                words = "; ".join(f"{item.grounds}, as by {names}: {item.remedy}" for item, names in told)
                 yield replace(holder(other_robot), causes=ids, words=words)
 
 
@@ -459,11 +457,6 @@ def _further(
                 continue
             if (other_robot := _changed(file, earlier, cause)) is not None:
                 yield (*causes, cause), other_robot
-
-
-def _told(cause: RobotHypothesis) -> str:
-    engines = ", ".join(" ".join(part for part in item if part) for item in cause.known.items())
-    return f"{cause.grounds}, as by {engines}: {cause.remedy}"
 
 
 def _changed(file: RobotFile, robot: Robot, cause: RobotHypothesis) -> Robot | None:

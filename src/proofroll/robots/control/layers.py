@@ -57,6 +57,7 @@ from proofroll.robots.control.differences import (
     efforts_of,
     held_rows,
     instant_rows,
+    passed_instants,
     rows_are_steps,
     servo_rows,
     sources,
@@ -185,7 +186,7 @@ class _Evidence:
 
 def _layer(name: str, evidence: _Evidence, skipped: Collection[str], time: SearchTime) -> Layer:
     """A layer, with the mistakes that explain it if it does not hold; ``skipped``: those not looked at before it."""
-    compared = evidence.difference(name)
+    compared = (name != "effort" and passed_instants(evidence.record, evidence.law)) or evidence.difference(name)
     if not isinstance(compared, str) and not len(compared.time):
         compared = "no row that counts lies at an instant of the controller"
     if isinstance(compared, str):
@@ -225,27 +226,19 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
             fit, off_stops, remark = rival
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
-    floats, off = "q_WB.w" in record.columns, f"the forces are off by {error(fit.off)} of the largest"
-    white = white_noise(record, efforts=not floats) if fit.off > fit.bar else None
-    smoothed = noisy_layer(record, law, evidence.in_air.held, off) if white is not None and not floats else None
-    noise = noise_of_states(record) if fit.off > fit.bar and white is None else None
-    if smoothed is None and ((fit.hidden and fit.bar < 1) or noise is not None):
-        why, part = (fit.hidden, fit.off) if noise is None else (f"{noise.words} may hide a cause", noise.part)
-        smoothed = Layer("acceleration", reason=f"{off}; {why}", undecided=True, noise=part)
-    if smoothed is not None:
-        return smoothed
-    if fit.off > fit.bar and white is None and all(cause.id == FITTED for cause in fit.causes):
+    off = f"the forces are off by {error(fit.off)} of the largest"
+    if (hidden := _hidden(record, law, evidence.in_air.held, fit, off)) is not None:
+        return hidden
+    if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
     fit = dataclasses.replace(fit, between=fit.between and not (stepwise or rows_are_steps(record, law)))
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
-    if fit.between or white is not None:
+    if fit.between:
         advice = f"steps between the rows may explain it: {assumed or 'log every step to decide'}"
-        if white is not None:
-            advice = f"white noise of up to {error(100 * white.part, 1)} % of a range may hide one"
         reason = "; ".join(filter(None, (f"{off}, and no cause is known", advice, remark)))
-        return Layer("acceleration", reason=reason, undecided=True, noise=0.0 if white is None else white.part)
+        return Layer("acceleration", reason=reason, undecided=True)
     implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
     holds = fit.off <= fit.bar and not fit.causes
     if assumed and not holds and all(cause.after > fit.bar for cause in fit.causes):
@@ -262,6 +255,20 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
         causes=fit.causes,
         tried=0 if earlier else fit.tried,
     )
+
+
+def _hidden(record: ControlRecord, law: ControlLaw, held: HeldRobot, fit: AirFit, off: str) -> Layer | None:
+    """Layer of accelerations that noise, soft friction or the digits of the record hide; None: nothing does."""
+    floats, undecided = "q_WB.w" in record.columns, partial(Layer, "acceleration", undecided=True)
+    if fit.off <= fit.bar and not fit.hidden:
+        return None
+    if (white := white_noise(record, efforts=not floats)) is not None:
+        advice = f"white noise of up to {error(100 * white.part, 1)} % of a range may hide one"
+        hidden = undecided(reason=f"{off}, and no cause is known; {advice}", noise=white.part)
+        return hidden if floats else noisy_layer(record, law, held, off) or hidden
+    if (noise := noise_of_states(record)) is not None:
+        return undecided(reason=f"{off}; {noise.words} may hide a cause", noise=noise.part)
+    return undecided(reason=f"{off}; {fit.hidden}", noise=fit.off) if fit.hidden and fit.bar < 1 else None
 
 
 def _of_another_robot(
@@ -336,7 +343,8 @@ def _explained(
         item, bound = MistakeExplanation(mistake, size, left), max(2 * left, rounding)
         return bounded(item, lambda size: largest(under(mistake.changed(evidence.law, size))), bound)
 
-    candidates = [item for item in mistakes(evidence.law) if _shows(item, shown)]
+    known, before = mistakes(evidence.law), list(LAYERS)[list(LAYERS).index(name) - 1]
+    candidates = [item for item in known if item.layer in shown or (item.later and item.layer == before)]
     several, tried = explanations(candidates, explanation, time)
     ranked = [(item.rank, item.cause) for item in several]
     if "target" in shown and (offset := _offset(evidence, evidence.law)) is not None:
@@ -391,12 +399,6 @@ def _trials(name: str, evidence: _Evidence, bars: Array) -> LayerTrials:
         yield from [] if offset is None else [offset]
 
     return LayerTrials(parts, partial(evidence.left, name), fitting)
-
-
-def _shows(mistake: Mistake, layers: Sequence[str]) -> bool:
-    """True if a record may show a mistake first at one of the layers; the last of them is looked at."""
-    order = list(LAYERS)
-    return mistake.layer in layers or (mistake.later and order.index(mistake.layer) + 1 == order.index(layers[-1]))
 
 
 def _fitted_causes(name: str, compared: LayerDifferences, evidence: _Evidence, most: float) -> Iterator[LayerCause]:

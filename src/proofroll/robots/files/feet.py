@@ -127,7 +127,10 @@ def ground_tables(
         "floor": of_urdf or ground == ON_A_PLANE,
         "drop": standing.drop,
     }
-    rows = _near(file.path, file.kind, content, dict(plain(asked)))
+    with tempfile.TemporaryDirectory() as folder:
+        copy = reading.write(RobotFile(file.path, file.kind, fromstring(content)), Path(folder))
+        limits = (dict(plain(asked)), TIME_LIMIT)
+        rows, _ = by_definer("mjcf", file.path, None, lambda worker: near_shapes(worker, file.path, copy, *limits))
     shapes = [_shape(standing, row) for row in rows["shapes"]]
     pairs = [_NearPair(**row | {"shapes": tuple(shapes[k] for k in row["shapes"])}) for row in rows["pairs"]]
     pairs = [pair for pair in pairs if pair.moves and (pair.on_floor or not of_urdf)]
@@ -399,12 +402,3 @@ def _listed(names: Sequence[str]) -> str:
     """The first names, and the number of the others."""
     others = counted(len(names) - _NAMED, "others")
     return ", ".join(names[:_NAMED]) + (f" and {others}" if names[_NAMED:] else "")
-
-
-def _near(path: Path, kind: str, content: bytes, asked: dict[str, Any]) -> dict[str, Any]:
-    """Shapes that come near each other in a robot file of this content; see the function that answers."""
-    file = RobotFile(path, kind, fromstring(content))
-    with tempfile.TemporaryDirectory() as folder:
-        copy = reading.write(file, Path(folder))
-        answer, _ = by_definer("mjcf", path, None, lambda worker: near_shapes(worker, path, copy, asked, TIME_LIMIT))
-    return answer

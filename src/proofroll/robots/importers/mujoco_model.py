@@ -76,24 +76,20 @@ def near_shapes(
         for contact in data.contact[: data.ncon]:
             first, second = sorted(contact.geom.tolist())
             face = _face(model, data, contact)
-            laws = found.setdefault((first, second), _laws(contact) | {"face": face, "start": _NEAR})
+            combined = {  # by MuJoCo, of those of the shapes
+                "dim": int(contact.dim),
+                "friction": contact.friction.tolist(),
+                "softness": contact.solref.tolist(),
+                "margin": float(contact.includemargin),
+                "distance": float(contact.dist),
+            }
+            laws = found.setdefault((first, second), combined | {"face": face, "start": _NEAR})
             laws["distance"] = min(laws["distance"], float(contact.dist))
             laws["face"] = face if laws["face"] == face else []
             laws["start"] = laws["start"] if step else min(laws["start"], float(contact.dist))
     geoms = sorted({geom for pair in found for geom in pair})
     pairs = [{"shapes": [geoms.index(geom) for geom in pair]} | laws for pair, laws in sorted(found.items())]
     return {"shapes": [_shape(model, geom) for geom in geoms], "pairs": pairs}
-
-
-def _laws(contact: Any) -> dict[str, Any]:
-    """Laws of a contact as MuJoCo combined those of its shapes."""
-    return {
-        "dim": int(contact.dim),
-        "friction": contact.friction.tolist(),
-        "softness": contact.solref.tolist(),
-        "margin": float(contact.includemargin),
-        "distance": float(contact.dist),
-    }
 
 
 def _face(model: Any, data: Any, contact: Any) -> list[int]:

@@ -108,7 +108,7 @@ class AirForces(NamedTuple):
         weight: (nv).
         free: directions that loops and couplings allow, (nv, freedoms).
         motion: of the bodies.
-        pushes: velocities of the bodies' centres along the world's axes for each velocity, (bodies, 3, nv).
+        pushes: of gravity of 1 m/s² along the world's axes, and of 1 N at the centre of each body, (1 + bodies, 3, nv).
     """
 
     mass: Array
@@ -178,20 +178,17 @@ class AirRobot:
             for number, force in beyond:
                 mode[number] = joints[number].moving(-force)
 
-    @cached_property
-    def _weights(self) -> Array:
-        """Weights of the bodies in world axes [N], (bodies, 3)."""
-        return np.outer([body.mass for body in self.mechanism.bodies], self.mechanism.gravity)
-
     def forces(self, q: Array, v: Array) -> AirForces:
         """Forces of the robot in a state without efforts."""
         solution = self.equations.solve(q, v)
         J, M, _ = self.equations.inertial(solution.motion)
-        weight = np.einsum("bi,bij->j", self._weights, J[:, :3])
+        masses = [body.mass for body in self.mechanism.bodies]
+        pushes = np.concatenate([np.tensordot(masses, J[:, :3], 1)[None], J[:, :3]])
+        weight = np.array(self.mechanism.gravity) @ pushes[0]
         rank = self.equations.rank
         free = np.linalg.svd(solution.rows.C)[2][rank:].T if rank else np.eye(len(M))
         inertial = M @ solution.acceleration - weight
-        return AirForces(M, inertial, weight, free, solution.motion, J[:, :3])
+        return AirForces(M, inertial, weight, free, solution.motion, pushes)
 
     def coordinates(self, q: Array, v: Array, base: Array | None) -> tuple[Array, Array]:
         """Coordinates and velocities of the mechanism.

@@ -158,7 +158,10 @@ def _add(
         _include(root, path, file.parent, inside, (file,))
         _merge_defaults(root)
         if len(root.findall("worldbody")) > count:
-            _merge_worlds(root)
+            worlds = root.findall("worldbody")  # those of included files too; their meaning stays the same
+            worlds[-1][:] = [child for world in worlds for child in world]
+            for world in worlds[:-1]:  # Pinocchio reads a tree twice, and refuses a class defined after its use
+                root.remove(world)
     contained = names_files_inside(root, file.parent, inside)
     for extension in [*root.iter("extension")]:
         extension[:] = []
@@ -231,17 +234,6 @@ def _merge_defaults(root: Element) -> None:
                 present.attrib |= child.attrib
         whole.extend(included.findall("default"))
         root.remove(included)
-
-
-def _merge_worlds(root: Element) -> None:
-    """Merges all <worldbody> elements, those of included files too, into the last one; their meaning stays the same.
-
-    Pinocchio reads a tree twice if there are two worlds, and refuses a class that is defined after its use.
-    """
-    worlds = root.findall("worldbody")
-    worlds[-1][:] = [child for world in worlds for child in world]
-    for world in worlds[:-1]:
-        root.remove(world)
 
 
 def _solid(root: Element, shapes: Sequence[Classed]) -> set[Element]:
