@@ -216,8 +216,8 @@ def _softened(trial: _Trial, law: ControlLaw, robot: AirRobot) -> bool:
     beyond = near + staged * np.abs(late)
     within = np.all((more <= beyond) & (more >= -2 * friction[rubbing] - beyond))
     left = rows.left - np.einsum("rij,rj->ri", columns, more).ravel()
-    closed = rows.rounded(left) or (staged and rms(left) <= _STAGED * rows.off)
-    return bool(within and closed and np.mean(np.abs(more) <= near) >= _BOUND)
+    explained = rows.rounded(left) or (staged and rms(left) <= _STAGED * rows.off)
+    return bool(within and explained and np.mean(np.abs(more) <= near) >= _BOUND)
 
 
 def _causes(rows: AirRows, law: ControlLaw) -> list[LayerCause]:
@@ -292,8 +292,10 @@ def standing_fit(
             at_ends[f"q.{joint}"] = (q <= lower + near) | (q >= upper - near)
     off_stops, at_stops = _rows_without(at_ends, record.time)
     rubbing = [f"v.{joint.name}" for joint in held.mechanism.joints if joint.friction]
-    still = {name: np.abs(record.columns[name]) <= record.rounding[name] for name in rubbing if name in record.columns}
-    off_friction, at_rest = _rows_without(still, record.time)
+    standing = {
+        name: np.abs(record.columns[name]) <= record.rounding[name] for name in rubbing if name in record.columns
+    }
+    off_friction, at_rest = _rows_without(standing, record.time)
     remarks = [f"rows at an end of the range of a joint are left out: {at_stops}"] if at_stops else []
     remarks += [f"rows at which dry friction may hold a joint are left out: {at_rest}"] if at_rest else []
     usable = off_stops & off_friction

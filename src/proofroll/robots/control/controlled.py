@@ -441,7 +441,7 @@ def imported_robots(
             begun.append((causes, other_robot))
             with suppress(InputError, Refused):
                 ids = tuple(item.id for item in causes)
-                engines = (", ".join(" ".join(filter(None, known)) for known in item.known.items()) for item in causes)
+                engines = (", ".join(" ".join(filter(None, names)) for names in item.known.items()) for item in causes)
                 told = zip(causes, engines, strict=True)
                 words = "; ".join(f"{item.grounds}, as by {names}: {item.remedy}" for item, names in told)
                 yield replace(holder(other_robot), causes=ids, words=words)

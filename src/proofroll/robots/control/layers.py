@@ -243,7 +243,6 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
     holds = fit.off <= fit.bar and not fit.causes
     if assumed and not holds and all(cause.after > fit.bar for cause in fit.causes):
         remark = "; ".join(filter(None, (remark, assumed)))
-    earlier = next((layer.name for layer in layers if not layer.holds), "")
     return Layer(
         name="acceleration",
         residual=fit.off,
@@ -253,7 +252,7 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
             part for part in (implicit if fit.imitated else "", _DAMPED if fit.damped else "", remark) if part
         ),
         causes=fit.causes,
-        tried=0 if earlier else fit.tried,
+        tried=fit.tried if all(layer.holds for layer in layers) else 0,
     )
 
 
@@ -343,8 +342,8 @@ def _explained(
         item, bound = MistakeExplanation(mistake, size, left), max(2 * left, rounding)
         return bounded(item, lambda size: largest(under(mistake.changed(evidence.law, size))), bound)
 
-    known, before = mistakes(evidence.law), list(LAYERS)[list(LAYERS).index(name) - 1]
-    candidates = [item for item in known if item.layer in shown or (item.later and item.layer == before)]
+    every, previous = mistakes(evidence.law), list(LAYERS)[list(LAYERS).index(name) - 1]
+    candidates = [item for item in every if item.layer in shown or (item.later and item.layer == previous)]
     several, tried = explanations(candidates, explanation, time)
     ranked = [(item.rank, item.cause) for item in several]
     if "target" in shown and (offset := _offset(evidence, evidence.law)) is not None:

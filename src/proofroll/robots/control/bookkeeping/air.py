@@ -182,13 +182,12 @@ class AirRobot:
         """Forces of the robot in a state without efforts."""
         solution = self.equations.solve(q, v)
         J, M, _ = self.equations.inertial(solution.motion)
-        masses = [body.mass for body in self.mechanism.bodies]
-        pushes = np.concatenate([np.tensordot(masses, J[:, :3], 1)[None], J[:, :3]])
-        weight = np.array(self.mechanism.gravity) @ pushes[0]
+        pull = np.tensordot([body.mass for body in self.mechanism.bodies], J[:, :3], 1)
+        pushes, weight = np.concatenate([pull[None], J[:, :3]]), np.array(self.mechanism.gravity) @ pull
         rank = self.equations.rank
         free = np.linalg.svd(solution.rows.C)[2][rank:].T if rank else np.eye(len(M))
         inertial = M @ solution.acceleration - weight
-        return AirForces(M, inertial, weight, free, solution.motion, pushes)
+        return AirForces(mass=M, inertial=inertial, weight=weight, free=free, motion=solution.motion, pushes=pushes)
 
     def coordinates(self, q: Array, v: Array, base: Array | None) -> tuple[Array, Array]:
         """Coordinates and velocities of the mechanism.
