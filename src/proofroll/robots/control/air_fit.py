@@ -41,10 +41,11 @@ _ROWS = 5  # rows whose accelerations are computed
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEW = 150  # equations by which a scheme that is rare is looked at first
 _UNKNOWN = 3.0  # times what half an interval makes that steps between rows may make: efforts jump at instants
-_FEW_BARS = 3.0  # bars of rounding up to which what the right numbers leave accuses nothing
+_FEW_BARS = 3.0  # bars of rounding up to which what is left accuses nothing but a number beyond as many of its own
 _STAGED = 0.05  # part of what the right numbers leave that friction may leave over the stages of a step
 _BOUND = 0.05  # part of the rows at which friction is at its bound, at least
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
+_DIGITS = f"that is no more than {_FEW_BARS:.0f} times what the record's digits make"
 _SOFT = "dry friction within its bounds explains it, as that of MuJoCo, which is soft: no other cause is decided"
 
 
@@ -170,18 +171,16 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
         damped = scheme.damped and bool(robot.damping.any())
         return AirFit(best.off * scale, SAFETY * best.rounding * scale, damped=damped, imitated=imitated)
     bar = SAFETY * best.rounding
-    hidden = _SOFT if any(_softened(item, law, robot) for item in trials) else ""
-    if best.off <= _FEW_BARS * bar:
-        few = f"that is no more than {_FEW_BARS:.0f} times what the record's digits make, {error(bar * scale)}"
-        hidden = hidden or f"{few}: log more digits to decide"
-    if hidden:
-        return AirFit(best.off * scale, bar * scale, hidden=hidden)
+    few, soft = best.off <= _FEW_BARS * bar, any(_softened(item, law, robot) for item in trials)
     right = LayerCause("", "", None, best.off * scale)  # what no cause may leave, whatever the scheme
     causes: dict[str, LayerCause] = {}
-    for trial in trials:
-        for cause in _causes(trial.rows, law):
+    for trial in trials if not soft else ():
+        for cause in _causes(trial.rows, law, _FEW_BARS if few else 1.0):
             if cause.after < causes.get(cause.id, right).after:
                 causes[cause.id] = cause
+    if soft or (few and not causes):
+        digits = f"{_DIGITS}, {error(bar * scale)}: log more digits to decide"
+        return AirFit(best.off * scale, bar * scale, hidden=_SOFT if soft else digits)
     closed = any(cause.after <= bar * scale for cause in causes.values())  # by one of them to rounding
     several = [cause for cause in causes.values() if cause.after <= bar * scale or not closed]
     named = sorted(several, key=lambda cause: cause.after)
@@ -220,15 +219,15 @@ def _softened(trial: _Trial, law: ControlLaw, robot: AirRobot) -> bool:
     return bool(within and explained and np.mean(np.abs(more) <= near) >= _BOUND)
 
 
-def _causes(rows: AirRows, law: ControlLaw) -> list[LayerCause]:
-    """Numbers that close what the right ones leave, but those that leave more than the best's errors."""
-    causes = [*_numbers(rows, law)]
+def _causes(rows: AirRows, law: ControlLaw, bars: float = 1.0) -> list[LayerCause]:
+    """Numbers beyond so many bars that close what the right ones leave, but those that leave more than the best's."""
+    causes = [*_numbers(rows, law, bars)]
     least = max(min((cause.after for cause in causes), default=0.0), ROUND_OFF)
     return [cause for cause in causes if cause.after <= least * np.sqrt(1 + SAFETY**2 / len(rows.left))]
 
 
-def _numbers(rows: AirRows, law: ControlLaw) -> Iterator[LayerCause]:
-    """Numbers of the robot that close what the right ones leave."""
+def _numbers(rows: AirRows, law: ControlLaw, bars: float) -> Iterator[LayerCause]:
+    """Numbers of the robot beyond so many of their bars that close what the right ones leave."""
     right = right_numbers(law)
     for name, (words, unit) in NUMBERS.items():
         column = rows.columns[name]
@@ -239,7 +238,8 @@ def _numbers(rows: AirRows, law: ControlLaw) -> Iterator[LayerCause]:
         remainder, value = rows.left - change * column, right.get(name, 0.0) + change
         distance, matched = rms(remainder), rows.shown(column, remainder)
         bar = SAFETY * (rows.rounding if matched else max(rows.rounding, distance)) / np.sqrt(square) + ROUND_OFF
-        if not (matched or rows.explained(distance)) or abs(change) <= bar or (name not in _SIGNED and value < -bar):
+        told = (matched or rows.explained(distance)) and abs(change) > bars * bar
+        if not told or (name not in _SIGNED and value < -bar):
             continue
         if name in _SIGNED and abs(value + 1) <= bar:
             yield _cause(name, f"{words.removesuffix(' is')} has the other sign", -1.0, rows, distance)
