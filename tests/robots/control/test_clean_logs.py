@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from proofroll.robots.control.air_several import noise_of_states
+from proofroll.robots.control.differences import instant_rows, passed_instants
 from proofroll.robots.control.judge import RecordJudgement, judge_record
-from proofroll.robots.control.record import _roundings, read_record
+from proofroll.robots.control.record import _roundings, read_record, record_of
 
 JOINTS = ("a", "b", "c")
 ARM = """<mujoco><option timestep="0.001" integrator="{scheme}"/><worldbody>
@@ -46,8 +49,18 @@ Log = dict[str, np.ndarray]
 Judge = Callable[..., RecordJudgement]
 
 
-def log_of(seconds: float, scheme: str = "Euler", loss: float = 0.0, heavier: float = 1.0, lost: float = 1.0) -> Log:
-    """Columns of a loop around MuJoCo, a row for each step; of another arm with a heavier last link or lost efforts."""
+def log_of(
+    seconds: float,
+    scheme: str = "Euler",
+    loss: float = 0.0,
+    heavier: float = 1.0,
+    lost: float = 1.0,
+    clock: float = 0.0,
+) -> Log:
+    """Columns of a loop around MuJoCo, a row for each step; of another arm with a heavier last link or lost efforts.
+
+    ``clock``: time by which the clock of the policy is ahead [s].
+    """
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(ARM.format(scheme=scheme, loss=loss))
     model.body_mass[3] *= heavier
@@ -57,7 +70,7 @@ def log_of(seconds: float, scheme: str = "Euler", loss: float = 0.0, heavier: fl
     for step in range(round(seconds / 1e-3) + 1):
         q, v, time = data.qpos.copy(), data.qvel.copy(), step * 1e-3
         if step % 10 == 0:
-            action = np.array([math.tanh(0.8 * q[k] - 0.1 * v[k] + math.sin(3 * time + k)) for k in range(3)])
+            action = np.array([math.tanh(0.8 * q[k] - 0.1 * v[k] + math.sin(3 * (time + clock) + k)) for k in range(3)])
         target = POSE + SCALE * action
         effort = KP * (target - q) - KD * v
         rows.append([time, *q, *v, *action, *target, *effort])
@@ -124,6 +137,14 @@ def test_noise_of_sensors_leaves_layers_undecided(judge: Judge, seconds: float) 
 
 
 @pytest.mark.drill
+@pytest.mark.parametrize("clock", [0.05, -0.004])
+def test_a_clock_that_is_off_is_named(judge: Judge, clock: float) -> None:
+    """A policy that sees another time than that of the record is told so, with the time by which its clock is ahead."""
+    layer = next(layer for layer in judge(log_of(0.3, clock=clock)).layers if not layer.holds)
+    assert (layer.name, layer.causes[0].sentence) == ("action", f"the clock of the policy is off by {clock:.5g} s")
+
+
+@pytest.mark.drill
 def test_mistakes_beyond_the_noise_are_named(judge: Judge) -> None:
     """Gains and signs that make more than the noise are told in a noisy log."""
     log = noisy(log_of(0.5))
@@ -148,13 +169,30 @@ def test_a_log_without_noise_has_none(tmp_path: Path) -> None:
 
 
 @pytest.mark.drill
-@pytest.mark.parametrize("scheme", ["Euler", "implicitfast"])
+@pytest.mark.parametrize("scheme", ["Euler", "implicitfast", "RK4"])
 def test_soft_friction_is_told_as_softness(judge: Judge, scheme: str) -> None:
     """MuJoCo's dry friction below its bound is no other robot: the layer is not decided, and says why."""
     judged = judge(log_of(0.5, scheme, loss=0.1), loss=0.1)
     layer = judged.layers[-1]
     assert (judged.agrees, layer.undecided, layer.name) == (True, True, "acceleration")
     assert "dry friction within its bounds explains it, as that of MuJoCo" in layer.reason
+
+
+@pytest.mark.parametrize(("every", "late", "hidden"), [(4e-3, 0, True), (4e-3, 1, False), (2e-3, 0, False)])
+def test_rows_that_pass_between_instants_do_not_show_them(every: float, late: int, hidden: bool) -> None:
+    """Targets that change at the first row after each instant are no mistake, and those a row later may be one."""
+    times = every * np.arange(60)
+    instants = np.floor(times * 100 + 1e-6)
+    record = record_of(times[late:], {"target.a": instants[: len(times) - late]})
+    control: Any = SimpleNamespace(rate=100)
+    assert passed_instants(record, control).startswith(f"rows every {every:.4g} s pass") == hidden
+
+
+def test_targets_that_never_change_have_instants_of_the_clock() -> None:
+    """A record with constant targets, whose efforts may hold between instants, has these at multiples of their time."""
+    times = 2e-3 * np.arange(20)
+    control: Any = SimpleNamespace(rate=100)
+    assert instant_rows(record_of(times, {"target.a": 0 * times + 0.1}), control).tolist() == [0, 5, 10, 15]
 
 
 @pytest.mark.drill

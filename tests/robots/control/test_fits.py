@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes
+from proofroll.robots.control.fits import ServoRows, observation_causes, servo_causes, target_causes
 
 KP, KD, LIMIT = np.array([30.0, 40.0, 50.0]), np.array([0.5, 0.6, 0.7]), 20.0
 TIMES = np.linspace(0.0, 1.0, 60)
@@ -79,6 +81,47 @@ def test_gains_that_are_halved_are_not_the_efforts() -> None:
     assert told(rows(KP / 2, kd=KD / 2)) == ["kp and kd are both, or efforts are, 0.5 of the right ones"]
     largest = float(np.abs(rows(KP / 2, kd=KD / 2).effort).max())
     assert told(rows(KP / 2, kd=KD / 2), limit=1.1 * largest) == ["kp and kd are both 0.5 of the right ones"]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_a_gain_of_a_noisy_log_has_its_bar(noise: float) -> None:
+    """A gain that noise leaves open is told with a bar that the right one lies in, and one without noise alone."""
+    wrong = rows(1.3 * KP)
+    effort = wrong.effort + noise * np.random.default_rng(0).normal(size=wrong.effort.shape)
+    (clause,) = told(replace(wrong, effort=effort), 0.1)
+    number = re.fullmatch(r"kp is (\S+)(?: ± (\S+))? of the right one", clause)
+    assert number is not None
+    assert (number[2] is None) == (noise == 0)
+    assert float(number[1]) == pytest.approx(1.3, abs=float(number[2] or 1e-9))
+
+
+EXCHANGED = "(a has that of c, b has that of a, c has that of b)"
+
+
+def test_an_exchange_of_three_joints_is_named() -> None:
+    """Efforts, and targets, of three joints that have each other's are told with the joint that each is of."""
+    right = rows(KP)
+    changed = replace(right, effort=right.effort[:, [2, 0, 1]])
+    causes = [cause.sentence for cause in servo_causes(changed, law(), 1e-6)]
+    assert causes == [f"efforts are of joints in another order {EXCHANGED}"]
+    pose = np.array([0.1, -0.2, 0.3])
+    control = SimpleNamespace(joints=("a", "b", "c"), pose=pose, scale=0.5)
+    sentences = [
+        item.sentence
+        for item in target_causes(pose + 0.5 * right.q[:, [2, 0, 1]], right.q, None, control, 1e-6)  # type: ignore[arg-type]
+    ]
+    assert sentences == [f"actions are for joints in another order {EXCHANGED}"]
+
+
+def test_a_dead_band_is_named_with_its_least_width() -> None:
+    """Errors below which kp does nothing are told for the joint that has them, up to the largest that was seen."""
+    right = rows(KP)
+    apart = right.target[:, 1] - right.q[:, 1]
+    effort = right.effort.copy()
+    effort[:, 1] = np.clip(KP[1] * np.where(np.abs(apart) < 0.1, 0, apart) - KD[1] * right.v[:, 1], -LIMIT, LIMIT)
+    (cause,) = servo_causes(replace(right, effort=effort), law(), 1e-6)
+    width = np.abs(apart[np.abs(apart) < 0.1]).max()
+    assert cause.sentence == f"kp does nothing near a target, up to at least: b {width:.5g}"
 
 
 def test_a_constant_that_is_added_is_no_size() -> None:

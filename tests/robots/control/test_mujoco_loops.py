@@ -36,7 +36,9 @@ def loop(
         eulerdamp: False where MuJoCo's Euler has its damping at the velocity before the step.
         step: of MuJoCo [s].
         planted: ``heavier``, a factor on the mass and the inertia of the last link; ``torque``, ``friction``,
-            ``stiffness`` and ``damping`` of the second joint, which the file does not have; ``beat``, a torque.
+            ``stiffness``, ``damping`` and ``quadratic`` drag of the second joint, which the file does not have, and the
+            ``lost`` part of its efforts; ``beat``, a torque; gravity along x as ``tilt``, and a force on the second
+            link along y as ``push``.
     """
     file = path / "arm.xml"
     file.write_text(ARM.format(damping=0.4))
@@ -47,6 +49,7 @@ def loop(
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
     spec.body("three").mass *= planted.get("heavier", 1.0)
     spec.body("three").inertia *= planted.get("heavier", 1.0)
+    spec.option.gravity[0] += planted.get("tilt", 0.0)
     spec.joint("b").damping[0] += planted.get("damping", 0.0)
     model = spec.compile()
     data = mujoco.MjData(model)
@@ -59,6 +62,9 @@ def loop(
         data.qfrc_applied[1] += planted.get("torque", 0.0) - planted.get("stiffness", 0.0) * data.qpos[1]
         data.qfrc_applied[0] += planted.get("beat", 0.0) * np.sin(k * k / 50)
         data.qfrc_applied[1] -= planted.get("friction", 0.0) * np.sign(data.qvel[1])
+        data.qfrc_applied[1] -= planted.get("quadratic", 0.0) * data.qvel[1] * abs(data.qvel[1])
+        data.qfrc_applied[1] -= planted.get("lost", 0.0) * torques[1]
+        data.xfrc_applied[2, 1] = planted.get("push", 0.0)
         mujoco.mj_step(model, data)
     q, v, efforts = map(np.array, zip(*rows, strict=True))
     arrays: Mapping[str, Any] = {"qpos": q, "qvel": v, "torques": efforts}
@@ -90,6 +96,11 @@ PLANTED: dict[str, tuple[dict[str, float], list[str]]] = {
     "a spring": ({"stiffness": 0.5}, ["stiffness"]),
     "dry friction": ({"friction": 0.1}, ["friction"]),
     "more damping": ({"damping": 0.2}, ["damping"]),
+    "quadratic drag": ({"quadratic": 0.2}, ["quadratic"]),
+    "a tilted gravity": ({"tilt": 0.3}, ["pull"]),
+    "a constant force": ({"push": 2.0}, ["push"]),
+    "an effort of the other sign": ({"lost": 2.0}, ["efforts"]),
+    "an effort of nothing": ({"lost": 1.0}, ["efforts"]),
     "more damping and a spring": ({"damping": 0.2, "stiffness": 0.5}, ["damping", "stiffness"]),
     "a heavier link and a constant torque": ({"heavier": 1.05, "torque": 0.3}, ["payload", "torque"]),
 }

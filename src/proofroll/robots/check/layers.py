@@ -171,7 +171,8 @@ def differences(truth: RobotTruth, reading: Reading, until: str = "") -> dict[st
     common = [name for name in reading.joints if expected.get(name) == dofs[name]]
     if not common or until == "joints":
         return off
-    G, theirs = _selection(robot, common, reduced), _columns(reading, common)
+    G, spans = _selection(robot, common, reduced), dict(zip(reading.joints, slices(reading.dofs), strict=True))
+    theirs = [index for name in common for index in range(spans[name].start, spans[name].stop)]
     groups = robot.groups
     both = [name for name in common if name in reading.mass]
     scales = truth.scales
@@ -227,11 +228,6 @@ def _selection(robot: Robot, joints: Iterable[str], reduced: set[str]) -> Array:
                 block[columns[follower]] = followers[follower].multiplier
         blocks.append(block)
     return np.concatenate(blocks, axis=1)
-
-
-def _columns(reading: Reading, joints: list[str]) -> list[int]:
-    spans = dict(zip(reading.joints, slices(reading.dofs), strict=True))
-    return [index for name in joints for index in range(spans[name].start, spans[name].stop)]
 
 
 def _kinematics(truth: RobotTruth, reading: Reading, joints: list[str]) -> float:

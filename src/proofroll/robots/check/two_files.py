@@ -23,7 +23,7 @@ from proofroll.robots.check.records import AgainstCheck, UnlikeValue, UsedTruth
 from proofroll.robots.check.two_formulations import passive
 from proofroll.robots.files import reading
 from proofroll.robots.files.meaning import USUAL, CheckSettings, moving_robot, source_of
-from proofroll.robots.files.robot_file import LintRemark, RobotFile
+from proofroll.robots.files.robot_file import RobotFile
 from proofroll.robots.model import Array, Mimic, Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.states import random_states
@@ -174,13 +174,13 @@ def against(
     # Remedies and known engines are about engines and not about files.
     causes = ([dataclasses.replace(cause, remedy="", known="") for cause in row.causes] for row in rows)
     of_files = [dataclasses.replace(row, causes=item) for row, item in zip(rows, causes, strict=True)]
-    remarks = _lint(second, other_robot)
+    remarks = (*second.remarks, *lint(second, other_robot))
     further = (dataclasses.replace(item, where=f"{rival.name}: {item.where}") for item in remarks)
     return AgainstCheck(
         file=str(path),
         kind=file.kind,
         base=settings.base if "urdf" in {file.kind, second.kind} else "as in the file",
-        lint=[*_lint(file, robot), *further],
+        lint=[*file.remarks, *lint(file, robot), *further],
         truth=UsedTruth(by=by, difference=bar, states=settings.states, seed=settings.seed, velocities=robot.dofs),
         layers=LAYERS,
         engines=of_files,
@@ -202,10 +202,6 @@ def _meant(path: Path, settings: CheckSettings, workers: Workers) -> tuple[Robot
     with tempfile.TemporaryDirectory() as folder:
         file, _, robot, compiler = moving_robot(path, settings, workers, Path(folder))
     return file, robot, source_of(compiler)
-
-
-def _lint(file: RobotFile, robot: Robot) -> list[LintRemark]:
-    return [*file.remarks, *lint(file, robot)]
 
 
 def _answer(robot: Robot, truth: RobotTruth) -> reading.ReaderAnswer:

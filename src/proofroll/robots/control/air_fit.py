@@ -41,9 +41,12 @@ _ROWS = 5  # rows whose accelerations are computed
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEW = 150  # equations by which a scheme that is rare is looked at first
 _UNKNOWN = 3.0  # times what half an interval makes that steps between rows may make: efforts jump at instants
-_HALF = 0.5  # part of what the right numbers leave that several together may leave
+_FEW_BARS = 3.0  # bars of rounding up to which what is left accuses nothing but a number beyond as many of its own
+_STAGED = 0.05  # part of what the right numbers leave that friction may leave over the stages of a step
 _BOUND = 0.05  # part of the rows at which friction is at its bound, at least
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
+_DIGITS = f"that is no more than {_FEW_BARS:.0f} times what the record's digits make"
+_SOFT = "dry friction within its bounds explains it, as that of MuJoCo, which is soft: no other cause is decided"
 
 
 class _Trial(NamedTuple):
@@ -68,7 +71,7 @@ class AirFit:
             more as well.
         tried: number of numbers and bodies that were tried.
         between: True if more than rounding is left, which no cause explains and steps between the rows may.
-        softened: True if dry friction that stays within its bound explains it, as that of MuJoCo below its bound does.
+        hidden: clause on what hides every cause, soft friction or the digits of the record; empty: nothing does.
     """
 
     off: float
@@ -78,7 +81,7 @@ class AirFit:
     imitated: bool = False
     tried: int = 0
     between: bool = False
-    softened: bool = False
+    hidden: str = ""
 
     @property
     def left(self) -> float:
@@ -133,7 +136,7 @@ def acceleration_fit(
                 if scheme in rarer and any(item.rows.exact for item in trials):
                     break
                 begun = table.rows(first, rated, scheme, central=central) if trials or not together else None
-                hopeful = begun is None or _promising(begun, law, together=together)
+                hopeful = begun is None or _promising(_Trial(scheme, begun, True), law, robot, together=together)
                 if not hopeful and (scheme in rarer or not together):
                     continue
                 trials.append(_Trial(scheme, table.rows(rows, rated, scheme, central=central), hopeful))
@@ -151,9 +154,10 @@ def _spread(rows: Any, most: int) -> Any:
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))]
 
 
-def _promising(rows: AirRows, law: ControlLaw, *, together: bool) -> bool:
+def _promising(trial: _Trial, law: ControlLaw, robot: AirRobot, *, together: bool) -> bool:
     """True if a scheme may explain a record by what it leaves at a few rows, with or without a cause."""
-    return rows.exact or bool(_causes(rows, law)) or (together and may_be_explained(rows, law.joints))
+    rows, softened = trial.rows, trial.scheme.stages and _softened(trial, law, robot)
+    return rows.exact or softened or bool(_causes(rows, law)) or (together and may_be_explained(rows, law.joints))
 
 
 def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, together: bool) -> AirFit:
@@ -166,33 +170,37 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
         imitated = scheme.implicit and bool(armed)
         damped = scheme.damped and bool(robot.damping.any())
         return AirFit(best.off * scale, SAFETY * best.rounding * scale, damped=damped, imitated=imitated)
+    bar = SAFETY * best.rounding
+    few, soft = best.off <= _FEW_BARS * bar, any(_softened(item, law, robot) for item in trials)
     right = LayerCause("", "", None, best.off * scale)  # what no cause may leave, whatever the scheme
     causes: dict[str, LayerCause] = {}
-    for trial in trials:
-        for cause in _causes(trial.rows, law):
+    for trial in trials if not soft else ():
+        for cause in _causes(trial.rows, law, _FEW_BARS if few else 1.0):
             if cause.after < causes.get(cause.id, right).after:
                 causes[cause.id] = cause
-    bar = SAFETY * best.rounding
+    if soft or (few and not causes):
+        digits = f"{_DIGITS}, {error(bar * scale)}: log more digits to decide"
+        return AirFit(best.off * scale, bar * scale, hidden=_SOFT if soft else digits)
     closed = any(cause.after <= bar * scale for cause in causes.values())  # by one of them to rounding
     several = [cause for cause in causes.values() if cause.after <= bar * scale or not closed]
     named = sorted(several, key=lambda cause: cause.after)
     if together and not closed:
         likely = [rows for item, rows, hopeful in trials if hopeful and not item.stages]
         sets = [several_causes(rows, law.joints, right_numbers(law)) for rows in likely]
-        halving = [found for found in sets if found and found[0].after <= _HALF * right.after]
-        named = min(halving, key=len, default=named)
+        named = min(filter(None, sets), key=len, default=named)
     # The steps of the program may be no rows.
     between = not named and bar < best.off <= _UNKNOWN * min(item.rows.unknown for item in trials)
     tried = len(NUMBERS) + len(best.added)
-    softened = not named and any(_softened(item.rows, law, robot) for item in trials)
-    return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between, softened=softened)
+    return AirFit(best.off * scale, bar * scale, tuple(named), tried=tried, between=between)
 
 
-def _softened(rows: AirRows, law: ControlLaw, robot: AirRobot) -> bool:
+def _softened(trial: _Trial, law: ControlLaw, robot: AirRobot) -> bool:
     """True if dry friction within its bounds, and at them at some rows, leaves no more than rounding.
 
     MuJoCo's friction is a soft row: below its bound it is a force by the velocity and the acceleration of its joint.
+    Over the stages of RK4 it changes, so that its mean goes beyond by a part of what half an interval makes.
     """
+    rows, staged = trial.rows, trial.scheme.stages
     bounds = {joint.name: joint.friction for joint in robot.mechanism.joints}
     friction = np.array([bounds[name] for name in law.joints])
     rubbing = friction > 0
@@ -200,23 +208,26 @@ def _softened(rows: AirRows, law: ControlLaw, robot: AirRobot) -> bool:
         return False
     rows = rows.without(rows.slow) if rows.slow.any() and not rows.slow.all() else rows
     columns = rows.by_joint["friction"][:, rubbing].reshape(-1, rows.freedoms, np.count_nonzero(rubbing))
-    more = np.einsum("rij,rj->ri", np.linalg.pinv(columns), rows.left.reshape(-1, rows.freedoms))
+    inverse = np.linalg.pinv(columns)
+    more, late = (np.einsum("rij,rj->ri", inverse, item.reshape(-1, rows.freedoms)) for item in (rows.left, rows.late))
     sizes = np.linalg.norm(columns, axis=1)
     near = SAFETY * rows.rounding / sizes[sizes > 0].min(initial=np.inf) + ROUND_OFF
-    within = np.all((more <= near) & (more >= -2 * friction[rubbing] - near))
+    beyond = near + staged * np.abs(late)
+    within = np.all((more <= beyond) & (more >= -2 * friction[rubbing] - beyond))
     left = rows.left - np.einsum("rij,rj->ri", columns, more).ravel()
-    return bool(within and rows.rounded(left) and np.mean(np.abs(more) <= near) >= _BOUND)
+    explained = rows.rounded(left) or (staged and rms(left) <= _STAGED * rows.off)
+    return bool(within and explained and np.mean(np.abs(more) <= near) >= _BOUND)
 
 
-def _causes(rows: AirRows, law: ControlLaw) -> list[LayerCause]:
-    """Numbers that close what the right ones leave, but those that leave more than the best's errors."""
-    causes = [*_numbers(rows, law)]
+def _causes(rows: AirRows, law: ControlLaw, bars: float = 1.0) -> list[LayerCause]:
+    """Numbers beyond so many bars that close what the right ones leave, but those that leave more than the best's."""
+    causes = [*_numbers(rows, law, bars)]
     least = max(min((cause.after for cause in causes), default=0.0), ROUND_OFF)
     return [cause for cause in causes if cause.after <= least * np.sqrt(1 + SAFETY**2 / len(rows.left))]
 
 
-def _numbers(rows: AirRows, law: ControlLaw) -> Iterator[LayerCause]:
-    """Numbers of the robot that close what the right ones leave."""
+def _numbers(rows: AirRows, law: ControlLaw, bars: float) -> Iterator[LayerCause]:
+    """Numbers of the robot beyond so many of their bars that close what the right ones leave."""
     right = right_numbers(law)
     for name, (words, unit) in NUMBERS.items():
         column = rows.columns[name]
@@ -227,7 +238,8 @@ def _numbers(rows: AirRows, law: ControlLaw) -> Iterator[LayerCause]:
         remainder, value = rows.left - change * column, right.get(name, 0.0) + change
         distance, matched = rms(remainder), rows.shown(column, remainder)
         bar = SAFETY * (rows.rounding if matched else max(rows.rounding, distance)) / np.sqrt(square) + ROUND_OFF
-        if not (matched or rows.explained(distance)) or abs(change) <= bar or (name not in _SIGNED and value < -bar):
+        told = (matched or rows.explained(distance)) and abs(change) > bars * bar
+        if not told or (name not in _SIGNED and value < -bar):
             continue
         if name in _SIGNED and abs(value + 1) <= bar:
             yield _cause(name, f"{words.removesuffix(' is')} has the other sign", -1.0, rows, distance)
@@ -273,14 +285,25 @@ def standing_fit(
     if isinstance(whole, str) or not _differs(whole):
         return StandingFit(whole, every, "")
     fit: AirFit | str = whole
-    off_stops, at_stops = _rows_without(_at_ends(record, ranges), record.time)
-    off_friction, at_rest = _rows_without(_at_rest(record, held), record.time)
+    at_ends = {}
+    for joint, (lower, upper) in ranges.items():
+        near = _NEAR * (upper - lower)
+        if (q := record.columns.get(f"q.{joint}")) is not None:
+            at_ends[f"q.{joint}"] = (q <= lower + near) | (q >= upper - near)
+    off_stops, at_stops = _rows_without(at_ends, record.time)
+    rubbing = [f"v.{joint.name}" for joint in held.mechanism.joints if joint.friction]
+    standing = {
+        name: np.abs(record.columns[name]) <= record.rounding[name] for name in rubbing if name in record.columns
+    }
+    off_friction, at_rest = _rows_without(standing, record.time)
     remarks = [f"rows at an end of the range of a joint are left out: {at_stops}"] if at_stops else []
     remarks += [f"rows at which dry friction may hold a joint are left out: {at_rest}"] if at_rest else []
     usable = off_stops & off_friction
     if remarks:
         fit = acceleration_fit(record, law, held, efforts, steady, usable)
-    if isinstance(fit, str) or (_differs(fit) and (len(fit.causes) != 1 or fit.causes[0].id == FITTED)):
+    if isinstance(fit, str) or (
+        _differs(fit) and not fit.hidden and (len(fit.causes) != 1 or fit.causes[0].id == FITTED)
+    ):
         motors = _held_joints(record, law, held, efforts, off_stops)
         if motors is not None:
             return StandingFit(replace(whole, causes=(motors,), between=False), every, "")
@@ -290,22 +313,6 @@ def standing_fit(
 def _differs(fit: AirFit) -> bool:
     """True if accelerations are not the right ones, or rounding hides whether they are."""
     return fit.off > fit.bar or fit.bar >= 1
-
-
-def _at_ends(record: ControlRecord, ranges: Mapping[str, tuple[float, float]]) -> dict[str, NDArray[np.bool_]]:
-    """Column of each joint -> True at rows at which it is at an end of its range, or beyond it."""
-    ends = {}
-    for joint, (lower, upper) in ranges.items():
-        near = _NEAR * (upper - lower)
-        if (q := record.columns.get(f"q.{joint}")) is not None:
-            ends[f"q.{joint}"] = (q <= lower + near) | (q >= upper - near)
-    return ends
-
-
-def _at_rest(record: ControlRecord, held: HeldRobot) -> dict[str, NDArray[np.bool_]]:
-    """Column of each joint with dry friction -> True at rows at which it does not move."""
-    names = [f"v.{joint.name}" for joint in held.mechanism.joints if joint.friction]
-    return {name: np.abs(record.columns[name]) <= record.rounding[name] for name in names if name in record.columns}
 
 
 def _rows_without(held: Mapping[str, NDArray[np.bool_]], time: Array) -> tuple[NDArray[np.bool_], str]:
@@ -318,15 +325,6 @@ def _rows_without(held: Mapping[str, NDArray[np.bool_]], time: Array) -> tuple[N
         return free, ""
     further = f" and {len(names) - 1} more" if len(names) > 1 else ""
     return free, f"{names[0]}, first at {time[int(np.argmax(held[names[0]]))]:.4g} s{further}"
-
-
-def _least_rates(robot: AirRobot, state: tuple[Array, Array], efforts: Array, friction: Array) -> Array:
-    """Sizes of the accelerations of driven joints that dry friction, (nv,), leaves at least."""
-    rates = np.abs(robot.equations.solve(*state, load=robot.load(efforts)).acceleration)
-    if friction.any():
-        M = robot.equations.inertial(robot.equations.tree.at(*state))[1]
-        rates = rates - np.abs(np.linalg.inv(M)) @ friction
-    return np.asarray(rates[robot.driven[:, 1]])
 
 
 def _held_joints(
@@ -344,11 +342,17 @@ def _held_joints(
         return None
     step = float(np.diff(record.time).mean())
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, _ROWS).astype(int))]
-    friction = np.zeros(mechanism.nv)
+    friction, rates = np.zeros(mechanism.nv), list[Array]()
     for joint, at_v in zip(mechanism.joints, mechanism.v_slices, strict=True):
         friction[at_v] = joint.friction
     try:
-        rates = [_least_rates(robot, motion[row], efforts[row], friction) for row in rows.tolist()]
+        for row in rows.tolist():
+            q, v = motion[row]
+            rate = np.abs(robot.equations.solve(q, v, load=robot.load(efforts[row])).acceleration)
+            if friction.any():
+                M = robot.equations.inertial(robot.equations.tree.at(q, v))[1]
+                rate = rate - np.abs(np.linalg.inv(M)) @ friction
+            rates.append(rate[robot.driven[:, 1]])  # what dry friction leaves at least
     except (Diverged, Refused, np.linalg.LinAlgError):
         return None
     changes = step * np.array(rates).max(axis=0)

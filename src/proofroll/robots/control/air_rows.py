@@ -7,7 +7,7 @@ link being m v (1 + |v|) at its centre of mass, and I w (1 + |w|).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -31,6 +31,13 @@ BY_JOINT: Mapping[str, tuple[str, str]] = {
     "damping": ("damping of", "N m s/rad or N s/m"),
     "stiffness": ("a spring of", "N m/rad or N/m"),
     "armature": ("an armature of more by", "kg m² or kg"),
+    "quadratic": ("drag v |v| of", "N m s²/rad² or N s²/m²"),
+    "efforts": ("efforts of", "of the right ones"),
+}
+# Vector along the world's axes -> what it is called, and its unit.
+VECTORS: Mapping[str, tuple[str, str]] = {
+    "pull": ("gravity is more by {}", "m/s²"),
+    "push": ("a constant force of {} acts on {body}", "N"),
 }
 _SLOW = 0.02  # part of its largest rate below which a joint is about to turn back
 FEWEST_ROWS = 4
@@ -94,6 +101,8 @@ class AirRows:
         columns: number -> what one more of it takes away, (numbers,).
         by_joint: number -> the same of it at each driven joint, (numbers, joints).
         added: body -> the same of its mass, first moment [kg m] and inertia about its origin, (numbers, 10).
+        pushed: body -> the same of a force at its centre along the world's axes [N], or nothing -> of gravity [m/s²],
+            (numbers, 3).
         rounding: root mean square of what rounding of the record makes of ``left``.
         late: part of ``left`` that half an interval between rows makes, where steps are not the rows, (numbers,).
         size: root mean square of the forces.
@@ -112,6 +121,7 @@ class AirRows:
     slow: NDArray[np.bool_]
     freedoms: int = 1
     blur: float = 0.0
+    pushed: Mapping[str, Array] = field(default_factory=dict)
 
     def proof(self, after: float, closing: str = "with that") -> str:
         """Clause on the forces that are off, and those that a cause leaves; ``after``: their root mean square."""
@@ -123,11 +133,12 @@ class AirRows:
 
     def changed(self, change: Callable[[Array], Array]) -> AirRows:
         """The same with a change of the remainder, and of all that more of numbers takes away."""
-        columns, by_joint, added = (
-            {name: change(item) for name, item in table.items()} for table in (self.columns, self.by_joint, self.added)
+        columns, by_joint, added, pushed = (
+            {name: change(item) for name, item in table.items()}
+            for table in (self.columns, self.by_joint, self.added, self.pushed)
         )
         left, late = change(self.left), change(self.late)
-        return replace(self, left=left, late=late, columns=columns, by_joint=by_joint, added=added)
+        return replace(self, left=left, late=late, columns=columns, by_joint=by_joint, added=added, pushed=pushed)
 
     @property
     def off(self) -> float:
@@ -254,7 +265,7 @@ class AirTable:
         def rates(y: Array) -> Array:
             place, velocity = y[: len(q)], y[len(q) :]
             first = np.array_equal(y, start)
-            M, inner, weight, free, _ = self._at(row) if first else _armed(robot, law, (place, velocity))
+            M, inner, weight, free = (self._at(row) if first else _armed(robot, law, (place, velocity)))[:4]
             acting = free.T @ (inner + law.gravity * weight + robot.load(effort_at(place[at_q], velocity[at_v])))
             rate = free @ np.linalg.solve(free.T @ M @ free, acting)
             return np.concatenate([robot.equations.tree.rate(place, velocity), rate])
@@ -337,6 +348,7 @@ class AirTable:
         noise = np.sqrt(squares + (parts * sum(sizes))[:, None] ** 2)
         damped_v = at_v + (h * rate[:, driven] if scheme.damped or scheme.whole else 0.0)
         of_joints = {"torque": np.ones(at_v.shape), "friction": -self.signs[rows], "damping": -damped_v}
+        of_joints |= {"quadratic": -at_v * np.abs(at_v), "efforts": effort}
         of_joints |= {"stiffness": -q[:, robot.driven[:, 0]], "armature": -rate[:, driven]}
         by_joint = {
             name: whitened(robot.load(values[:, None] * np.eye(len(driven))).swapaxes(1, 2))
@@ -347,16 +359,18 @@ class AirTable:
         columns |= {name: by_joint[name].sum(axis=1) for name in ("damping", "friction")}
         columns["armature"] = by_joint["armature"] @ (law.armature if law.armature.any() else np.ones(len(driven)))
         columns["implicit"] = by_joint["armature"] @ (h * law.kd)
+        named = [body.name for body in robot.mechanism.bodies]
         bodies = -np.moveaxis(self._of_bodies(forces, rate), 1, 0)
-        size = rms(whitened(masses - inner))
+        pushes = np.array([item.pushes for item in forces]).transpose(1, 0, 3, 2)
         return AirRows(
             left=whitened(acting),
             columns=columns,
             by_joint=by_joint,
-            added={body.name: whitened(values) for body, values in zip(robot.mechanism.bodies, bodies, strict=True)},
+            added={name: whitened(values) for name, values in zip(named, bodies, strict=True)},
+            pushed={name: whitened(values) for name, values in zip(["", *named], pushes, strict=True)},
             rounding=rms(noise),
             late=whitened(np.einsum("tij,tj->ti", M, following - rate) / 2),
-            size=size if size > ROUND_OFF * rms(whitened(weight)) else 1.0,
+            size=size if (size := rms(whitened(masses - inner))) > ROUND_OFF * rms(whitened(weight)) else 1.0,
             slow=np.repeat(self.slow[rows], into.shape[1]),
             freedoms=into.shape[1],
         )

@@ -21,6 +21,7 @@ from proofroll.robots.control.air_rows import (
     NUMBERS,
     ROUND_OFF,
     SAFETY,
+    VECTORS,
     AirRows,
     AirTable,
     StepScheme,
@@ -47,10 +48,9 @@ _EACH = 2  # equations for each number at least
 _SPREAD = 5.0  # standard deviations of a sum of squares within which numbers leave as little as all of them do
 _CLEAR, _SHARE = 10.0, 0.03  # least part of a number's forces that no others make: what is left of less is their noise
 _STRETCH, _TO_AND_FRO = 60, -0.25  # rows that show noise at least; correlation of its steps with the next ones at most
-_MEDIAN, _LARGEST = (
-    0.455,
-    6.0,
-)  # median of the square of a normal number; standard deviations of the largest of thousands
+_MEDIAN = 0.455  # median of the square of a normal number
+_LARGEST = 6.0  # standard deviations of the largest of thousands
+_EFFORTS = ("effort", "efforts")  # parts of the efforts that act, of all joints or of each
 _REST = "torque"  # number of a joint that a spring needs, too: its rest is not known
 
 
@@ -87,8 +87,9 @@ def several_causes(rows: AirRows, joints: Sequence[str], right: dict[str, float]
         if columns.shape[1] > _OF_A_POINT and carried is None and (carried := _carried(rows)):
             return carried
         values, remainder = _solved(columns, rows.left)
-        places = np.cumsum([0, *(group.columns.shape[1] for group in chosen)])
-        scales = [values[place] for group, place in zip(chosen, places, strict=False) if group.kind == "effort"]
+        kinds = [group.kind for group in chosen for _ in group.where]
+        parts = _EFFORTS if FITTED in kinds else _EFFORTS[:1]
+        scales = [value for value, kind in zip(values, kinds, strict=True) if kind in parts]
         if any(
             abs(scale + 1) <= ROUND_OFF for scale in scales
         ):  # without efforts, masses of nothing explain any motion
@@ -115,11 +116,13 @@ def _closing(groups: Sequence[_Group], rows: AirRows) -> Iterator[list[_Group]]:
 
     All groups but the scale of efforts leave least; with it, all of them together are the equations themselves.
     """
-    others = [group for group in groups if group.kind != "effort"]
+    others = [group for group in groups if group.kind not in _EFFORTS]
     sets = [*itertools.combinations(groups, 1), *itertools.combinations(groups, 2)]
     if not _close(others, rows):
-        sets = [chosen for chosen in sets if any(group.kind == "effort" for group in chosen)]
-    yield from ([*chosen] for chosen in sorted(sets, key=lambda item: _columns(item).shape[1]) if _close(chosen, rows))
+        sets = [chosen for chosen in sets if any(group.kind in _EFFORTS for group in chosen)]
+    sets.sort(key=lambda chosen: _columns(chosen).shape[1])
+    sets.sort(key=lambda chosen: any(group.kind == "push" for group in chosen))  # they make a constant torque, too
+    yield from ([*chosen] for chosen in sets if _close(chosen, rows))
 
 
 def _columns(groups: Sequence[_Group]) -> Array:
@@ -144,6 +147,8 @@ def _groups(rows: AirRows, joints: Sequence[str]) -> Iterator[_Group]:
         yield _Group(name, whole, tuple(joints) * (1 + len(rests)))
     for body, columns in rows.added.items():
         yield _Group(FITTED, columns, (body,) * columns.shape[1])
+    for body, columns in rows.pushed.items():
+        yield _Group("push" if body else "pull", columns, (body,) * columns.shape[1])
 
 
 def _scaled(columns: Array) -> tuple[Array, Array]:
@@ -229,6 +234,10 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
         words, unit = NUMBERS[group.kind]
         text, interval = with_bar(right.get(group.kind, 0.0) + values[0], bars[0], 1)
         return f"{words} {text} ± {interval} {unit}"
+    if group.kind in VECTORS:
+        words, unit = VECTORS[group.kind]
+        parts = ("{} ± {} {} along {}".format(*with_bar(values[k], bars[k], 1), unit, "xyz"[k]) for k in beyond)
+        return words.format(", ".join(parts), body=group.where[0])
     count = len(values) if group.kind != "stiffness" else len(values) // 2
     beyond = [k for k in beyond if k < count]
     words, unit = BY_JOINT[group.kind]
@@ -239,10 +248,10 @@ def _words(group: _Group, values: Array, bars: Array, right: dict[str, float]) -
     shown = shown or [(group.where[k], values[k], bars[k]) for k in beyond]
     texts = []
     for where, value, bar in shown[:_LISTED]:
-        text, interval = with_bar(float(value), float(bar), 1)
+        text, interval = with_bar(float(value) + (group.kind == "efforts"), float(bar), 1)
         texts.append(f"{text} ± {interval} at {where}")
     more = f" and at {len(shown) - _LISTED} more" if len(shown) > _LISTED else ""
-    return f"joints have {words} {', '.join(texts)}{more} {unit} that is not told"
+    return f"joints have {words} {', '.join(texts)}{more} {unit}{' that is not told' * (group.kind != 'efforts')}"
 
 
 class WhiteNoise(NamedTuple):
@@ -280,7 +289,7 @@ def noisy_layer(record: ControlRecord, law: ControlLaw, held: HeldRobot, off: st
         rows = table.rows(instants, moving[0], StepScheme(), central=True)
         lag = rows.late / (np.linalg.norm(rows.late) or 1.0)  # of no interest: states and efforts of other instants
         rows, groups = _moving(rows.changed(lambda values: values - np.multiply.outer(lag, lag @ values)), law.joints)
-        others = _columns([group for group in groups if group.kind != "effort"])
+        others = _columns([group for group in groups if group.kind not in _EFFORTS])
         count = int(np.linalg.matrix_rank(_scaled(others)[0], ROUND_OFF))
         if len(rows.left) < _EACH * count:
             return None
@@ -424,7 +433,7 @@ def _beyond_chance(rows: AirRows, joints: Sequence[str], count: int) -> list[_Gr
 def _single(groups: Iterable[_Group], joints: Sequence[str]) -> Iterator[_Group]:
     """Numbers of each joint and of each link, and those of the whole robot that are no sums over joints."""
     for group in groups:
-        if group.kind == FITTED or group.kind not in BY_JOINT:
+        if group.kind not in BY_JOINT:
             yield group
         elif group.where != ("",):
             parts = ((joint, group.columns[:, k :: len(joints)]) for k, joint in enumerate(joints))
@@ -437,7 +446,7 @@ def _taken(group: _Group, basis: Array, remainder: Array) -> tuple[float, int]:
     Efforts have most of the noise, so that all but a multiple of it has to be left of them.
     """
     parts, sizes = _scaled(group.columns)
-    least = _CLEAR * math.sqrt(len(remainder)) / sizes[0] if group.kind == "effort" else _SHARE
+    least = _CLEAR * math.sqrt(len(remainder)) / sizes[0] if group.kind in _EFFORTS else _SHARE
     directions, values, _ = np.linalg.svd(parts - basis @ (basis.T @ parts), full_matrices=False)
     independent = directions[:, values > least]
     return float(np.sum((independent.T @ remainder) ** 2)), independent.shape[1]

@@ -122,17 +122,11 @@ def _principal(inertia: Array, axes: Array) -> Array:
     moments, vectors = np.linalg.eigh(axes.T @ inertia @ axes)
     turned = []
     for order in map(list, itertools.permutations(range(3))):
-        nearest = _nearest(moments[order], vectors[:, order])
+        nearest = vectors[:, order].copy()
+        for moment in moments:
+            equal = np.abs(moments[order] - moment) <= _EQUAL * moments.max()
+            left, _, right = np.linalg.svd(vectors[:, order][:, equal].T[:, equal])
+            nearest[:, equal] = vectors[:, order][:, equal] @ left @ right
         signed = (nearest @ np.diag(signs) for signs in itertools.product((1.0, -1.0), repeat=3))
         turned += [item for item in signed if np.linalg.det(item) > 0]
     return max(turned, key=lambda item: round(float(np.trace(item)), _DIGITS))
-
-
-def _nearest(moments: Array, vectors: Array) -> Array:
-    """Principal axes, those of equal moments turned to be nearest to the first, second and third given axis."""
-    nearest = vectors.copy()
-    for moment in moments:
-        equal = np.abs(moments - moment) <= _EQUAL * moments.max()
-        left, _, right = np.linalg.svd(vectors[:, equal].T[:, equal])
-        nearest[:, equal] = vectors[:, equal] @ left @ right
-    return nearest

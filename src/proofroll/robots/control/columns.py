@@ -24,7 +24,6 @@ _DEGREE = np.pi / 180
 _MILLI = 1e-3
 _READINGS = 4  # of a record that are judged at most
 _SCHEMES = (-1.0, 0.0, 1.0)  # places move by the velocity before a step, by the mean, by that after it
-
 _OF_SCHEMES = 0.6  # intervals by which a method may move places before or after their rates
 _FEWEST = 5  # rows of which a lag is told
 _SURE = 5.0  # errors of a lag that it differs by
@@ -211,10 +210,10 @@ def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
     compared = measured(reading.record)
     if compared is None:
         return reading
-    lag, rounding = compared.lag_fit(), compared.rounding / np.sqrt(3)
+    lag, rounding, distance = compared.lag_fit(), compared.rounding / np.sqrt(3), compared.off()
     rows = 1 if lag.intervals > 0 else -1
     record = _moved(f"{name}.", rows, reading.record)
-    right = measured(record) if len(record.time) > _FEWEST else None
+    right = measured(record) if len(record.time) > _FEWEST and distance.off > _SURE * distance.rounding else None
     if right is None:
         return reading
     rest = right.lag_fit()
@@ -223,7 +222,7 @@ def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
     explained = rest.rest <= max(2 * rounding, _HELPS * lag.size)
     if not explained or abs(lag.intervals) <= _OF_SCHEMES + bar or abs(rest.intervals) > _OF_SCHEMES + bar:
         return reading
-    distance, remainder = compared.off(), right.off()
+    remainder = right.off()
     words = f"{_NAMES.get(name, name)} is one row {'late' if rows > 0 else 'early'}"
     text, interval = with_bar(abs(lag.intervals), bar, 1)
     proof = f"places off by {error(distance.off)}, by {error(remainder.off, 1)} with that; {text} ± {interval} rows"
@@ -322,7 +321,11 @@ def _of_spin(record: ControlRecord) -> _Contradiction | None:
 
 def _of_joint_columns() -> Iterator[ColumnMistake]:
     swapped = "the columns q.JOINT and v.JOINT are each the other"
-    yield ColumnMistake("swapped", swapped, partial(_exchanged, "q.", "v."))
+    others = {"q.": "v.", "v.": "q."}
+    renamed = partial(
+        ControlRecord.changed, change=lambda name, item: (others.get(name[:2], name[:2]) + name[2:], item)
+    )
+    yield ColumnMistake("swapped", swapped, renamed)
     yield ColumnMistake("degrees", "q.JOINT is in degrees: name it q.JOINT[deg]", partial(_scaled, "q.", _DEGREE))
     rates = "v.JOINT is in degrees per second: name it v.JOINT[deg/s]"
     yield ColumnMistake("degrees", rates, partial(_scaled, "v.", _DEGREE))
@@ -397,11 +400,7 @@ def _requaternioned(change: Mapping[str, str], record: ControlRecord) -> Control
         sign = -1.0 if "inverse" in change and axis in {"x", "y", "z"} else 1.0
         return f"q_WB.{axis}" if axis else name, sign * item
 
-    return _turned_again(record.changed(renamed))
-
-
-def _turned_again(record: ControlRecord) -> ControlRecord:
-    """The record with the velocities that it has along the axes of its base turned to the world's anew."""
+    record = record.changed(renamed)  # velocities that it has along the axes of its base are turned anew
     turned = tuple(f"{name}." for name in ("v_WB", "w_WB") if f"{name}_B.x" in record.columns)
     return in_world(record.changed(lambda name, item: None if name.startswith(turned) else (name, item)))
 
@@ -419,11 +418,6 @@ def _to_origin(centre: Array, record: ControlRecord) -> ControlRecord:
     moved = velocity - np.cross(spin, Rotation.from_quat(attitude, scalar_first=True).apply(centre))
     columns = dict(record.columns) | {f"v_WB.{axis}": moved[:, k] for k, axis in enumerate("xyz")}
     return replace(record, columns=columns)
-
-
-def _exchanged(first: str, second: str, record: ControlRecord) -> ControlRecord:
-    names = {first: second, second: first}
-    return record.changed(lambda name, item: (names.get(name[:2], name[:2]) + name[2:], item))
 
 
 def _scaled(start: str, factor: float, record: ControlRecord) -> ControlRecord:

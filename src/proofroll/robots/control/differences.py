@@ -48,7 +48,8 @@ def _of_instants(record: ControlRecord) -> list[str]:
     """Columns that change at instants; actions alone where targets change far more often, along ramps."""
     names = [name for name in record.columns if name.startswith(("action.", "target."))]
     actions = [name for name in names if name.startswith("action.")]
-    return actions if 0 < _OFTEN * _changes(record, actions) < _changes(record, names) else names
+    often = _changes(record, names)
+    return actions if 0 < _OFTEN * _changes(record, actions) < often else names if often else []
 
 
 def _changes(record: ControlRecord, names: Sequence[str]) -> int:
@@ -76,6 +77,21 @@ def _instant_rows(record: ControlRecord, rate: float) -> Any:
         if abs(periods - np.round(periods)) > SAME_TIME:
             return later
     return np.concatenate([[0], later])
+
+
+def passed_instants(record: ControlRecord, law: ControlLaw) -> str:
+    """Reason why a record does not show what is at instants: its rows pass between them; empty: they do not.
+
+    Each change is then at the first row after an instant.
+    """
+    numbers = record.time * law.rate
+    passing = np.diff(np.floor(numbers + SAME_TIME)) > 0
+    at_rows = np.abs(numbers - np.round(numbers)) < SAME_TIME
+    rows = instant_rows(record, law)
+    if at_rows[1:][passing].all() or not passing[rows[rows > 0] - 1].all():
+        return ""
+    every = float(np.diff(record.time).mean())
+    return f"rows every {every:.4g} s pass the controller's instants, every {1 / law.rate:.4g} s: log a row at each"
 
 
 def due_rows(record: ControlRecord, law: ControlLaw) -> Any:
@@ -274,6 +290,8 @@ def servo_rows(record: ControlRecord, law: ControlLaw) -> tuple[Array, Array, Ar
         return "the record has no columns q.JOINT and v.JOINT"
     target, rows, instants = record.stacked("target", law.joints), np.arange(len(q)), instant_rows(record, law)
     places = np.searchsorted(instants, rows, side="right") - 1
+    if (target is None or law.hold_effort) and (reason := passed_instants(record, law)):
+        return reason
     if target is None:
         if record.time[0] != 0 or (law.policy is None and not _of_instants(record) and not len(instants)):
             return "the record has no columns target.JOINT"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from proofroll.core.number_format import with_bar
 from proofroll.robots.control.bookkeeping.law import ControlLaw
 from proofroll.robots.control.bookkeeping.mistakes import offsets_told, orders
 from proofroll.robots.control.record import LayerCause
@@ -18,6 +19,7 @@ _ROWS = 2  # rows for each number of a joint at least
 _SAME = 1e-3  # relative difference of two numbers of joints that are told as one, and least one that is told
 _SMALL = 1e-9  # part of a column that is round-off
 _LEAST = 1e-6  # relative difference of a number of a servo that is told, where the record is as sharp
+_TOLD = 1e-5  # least relative bar of a number that is told beside it
 _SAFETY = 5.0  # on the errors of fitted numbers
 _RANK = 1e-4  # least part of the inputs of a servo along which they vary, for its numbers to be known
 
@@ -92,9 +94,10 @@ def servo_causes(rows: ServoRows, law: ControlLaw, most: float) -> Iterator[Laye
         yield LayerCause("late_effort", "efforts are those of the row before", None, late)
     yield from _other_targets(rows, law, most, left)
     yield from _falling_limit(rows, law, most, left)
-    for words, order in orders(law.joints):
-        if (after := left(right[:, order])) <= most:
-            yield LayerCause("effort_order", f"efforts are of joints in another order ({words})", None, after)
+    yield from _dead_band(rows, law, most, left)
+    if (order := _order(right, rows.effort, most)) is not None and (after := left(right[:, order])) <= most:
+        words = _order_words(law.joints, order)
+        yield LayerCause("effort_order", f"efforts are of joints in another order ({words})", None, after)
     fit = _ServoFit.of(rows, law, np.asarray((np.abs(right - rows.effort) > most * sizes).any(axis=0), bool), most)
     clauses = [] if fit is None else fit.clauses(law, lambda size: left(size * right) <= most)
     if fit is not None and clauses and (after := left(fit.efforts(rows))) <= most:
@@ -161,6 +164,37 @@ def _falling_limit(
         numbers = f"{stall:.4g} at rest, 0 at a speed of {-stall / slope:.4g}"
         words = f"the limit of efforts falls with the speed along them: {numbers}"
         yield LayerCause("falling_limit", words, None, residual, numbers=2)
+
+
+def _dead_band(rows: ServoRows, law: ControlLaw, most: float, left: Callable[[Array], float]) -> Iterator[LayerCause]:
+    """Efforts without the part of kp where a joint is near its target."""
+    apart, sizes = rows.target - rows.q, _sizes(rows.effort)
+    damping = law.effort(rows.q, rows.q, rows.v)
+    widths = np.where(np.abs(rows.effort - damping) <= most * sizes, np.abs(apart), 0.0).max(axis=0)
+    right = law.effort(rows.target, rows.q, rows.v)
+    wrong_joints = np.asarray((np.abs(right - rows.effort) > most * sizes).any(axis=0), bool)
+    wrong_joints &= widths < np.abs(apart).max(axis=0)
+    efforts = np.where((np.abs(apart) <= widths) & wrong_joints, damping, right)
+    if wrong_joints.any() and (residual := left(efforts)) <= most:
+        words = f"kp does nothing near a target, up to at least: {_listed(widths, wrong_joints, law.joints)}"
+        yield LayerCause("dead_band", words, None, residual, numbers=int(wrong_joints.sum()))
+
+
+def _order(computed: Array, recorded: Array, most: float) -> list[int] | None:
+    """Column of computed values (times, joints) that each recorded one has; None: they are no others in another order.
+
+    ``most``: largest difference, in parts of the size of a recorded column.
+    """
+    scaled, columns = computed[..., None] / _sizes(recorded), (recorded / _sizes(recorded)).T
+    apart = [np.abs(scaled[..., k] - column[:, None]).max(axis=0) for k, column in enumerate(columns)]
+    order = [k if parts[k] <= most else int(np.argmin(parts)) for k, parts in enumerate(apart)]
+    return order if sorted(order) == [*range(len(order))] != order else None
+
+
+def _order_words(joints: Sequence[str], order: Sequence[int]) -> str:
+    """Words for an order: those of a known one, or the joints that have others' numbers."""
+    moved = ", ".join(f"{joints[k]} has that of {joints[place]}" for k, place in enumerate(order) if place != k)
+    return next((words for words, known in orders(tuple(joints)) if [*known] == [*order]), moved)
 
 
 @dataclass
@@ -275,6 +309,10 @@ def target_causes(
         words = "actions are added to the present coordinates, not to the default pose"
         yield LayerCause("added", words, None, after)
     yield from _remembering(targets, actions, law, most, left)
+    order = _order(law.scale * actions, targets - law.pose, most)
+    if order is not None and (after := left(law.pose + law.scale * actions[:, order])) <= most:
+        words = _order_words(law.joints, order)
+        yield LayerCause("joint_order", f"actions are for joints in another order ({words})", None, after)
     affine = _affine(targets, actions)
     if affine is None:
         return
@@ -358,7 +396,9 @@ def _factor_clause(what: str, factors: Array, joints: Sequence[str], bars: Array
     if not wrong_joints.any():
         return []
     if wrong_joints.all() and _alike(factors):
-        return [f"{what} is {factors.mean():.5g} of the right one"]
+        bar = float(np.max(bars)) if np.ndim(bars) else 0.0
+        text = "{} ± {}".format(*with_bar(factors.mean(), bar, 1)) if bar > _TOLD else f"{factors.mean():.5g}"
+        return [f"{what} is {text} of the right one"]
     return [f"{what} is another: {_listed(factors, wrong_joints, joints, ' of the right one')}"]
 
 

@@ -7,10 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, error
@@ -164,7 +162,10 @@ def judge_record(
         read = record_of(times, columns, record, digits=digits)
         usual = LAYOUTS[layout].step
         if "sim_dt" in arrays:
-            stepwise = _are_steps(read, _step_of(record, arrays["sim_dt"]))
+            step = arrays["sim_dt"]
+            if step.size != 1 or step.dtype.kind not in "fiu":
+                raise InputError("sim_dt", record, "it has to be one number, the step of the simulator in seconds")
+            stepwise = _are_steps(read, float(step.ravel()[0]))
         elif usual is not None and _are_steps(read, usual):
             rows = f"rows are {usual:.4g} s apart, the usual step of {layout}"
             assumed = f"{rows}: if it stepped so, add sim_dt = {usual:.7g} to the file; else log every step"
@@ -208,13 +209,15 @@ def judge_record(
             ),
         ]
 
-    inertial = bool(layout) and LAYOUTS[layout].inertial and free
-    frames = model.base_frames
+    inertial, frames = bool(layout) and LAYOUTS[layout].inertial and free, model.base_frames
     readings = framed_readings(read, law, frames) if inertial else state_readings(read, law)
     reading, layers = _best_reading(
         readings, layers_of, () if inertial else frames, time, controlled=control is not None
     )
     read = reading.record
+    told = " ".join(cause.sentence for cause in reading.layer.causes if cause.id in _LAGS) if reading.layer else ""
+    lags = " and ".join(name for name in untold_lags(read) if name not in told)
+    untold = [f"the digits of the record do not tell whether {lags} may be a row late"] if lags else []
     return RecordJudgement(
         record=str(record),
         robot=str(robot),
@@ -223,7 +226,7 @@ def judge_record(
         rows=len(read.time),
         step=_step(read),
         layers=layers,
-        remarks=[*_too_fast(read, model.speeds), *_untold(reading)],
+        remarks=[*_too_fast(read, model.speeds), *untold],
         step_bound=_step_bound(model.mechanism, _step(read)),
     )
 
@@ -282,7 +285,8 @@ def _best_reading(
     if _open(best())[0]:
         try_rivals(_beside(plain[0], readings_of_early_rates))
     if not _told(best()):
-        candidates = sorted((rival for rival, _ in (*judged, *silent)), key=_count)
+        rivals = (rival for rival, _ in (*judged, *silent))
+        candidates = sorted(rivals, key=lambda rival: len(rival.layer.causes) if rival.layer else 0)
         by_state = {id(rival) for rival, _ in judged}
         trials = _of_importers(candidates, partial(layers_of, within=time), time)
         silent.extend(item for item in trials if id(item[0]) not in by_state)
@@ -306,11 +310,6 @@ def _of_importers(
             if time.over:
                 return trials
     return trials
-
-
-def _count(reading: StateReading) -> int:
-    """Number of mistakes of columns that a reading supposes."""
-    return 0 if reading.layer is None else len(reading.layer.causes)
 
 
 def _searched(
@@ -402,24 +401,9 @@ def _too_fast(record: ControlRecord, speeds: Mapping[str, float]) -> Iterator[st
             )
 
 
-def _untold(reading: StateReading) -> Iterator[str]:
-    """A sentence on rates that may be a row late, if there are any without a cause that says so."""
-    causes = () if reading.layer is None else reading.layer.causes
-    told = " ".join(cause.sentence for cause in causes if cause.id in _LAGS)
-    if names := [name for name in untold_lags(reading.record) if name not in told]:
-        yield f"the digits of the record do not tell whether {' and '.join(names)} may be a row late"
-
-
 def _are_steps(record: ControlRecord, step: float) -> bool:
     """True if the rows of a record are steps of a length [s]."""
     return bool(np.isclose(step, _step(record), rtol=_SAME_STEP))
-
-
-def _step_of(path: Path, values: NDArray[Any]) -> float:
-    """Step of the program that made a file of arrays [s]. Raises InputError if it is no number."""
-    if values.size != 1 or values.dtype.kind not in "fiu":
-        raise InputError("sim_dt", path, "it has to be one number, the step of the simulator in seconds")
-    return float(values.ravel()[0])
 
 
 def _step(record: ControlRecord) -> float:

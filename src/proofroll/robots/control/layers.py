@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -56,6 +57,7 @@ from proofroll.robots.control.differences import (
     efforts_of,
     held_rows,
     instant_rows,
+    passed_instants,
     rows_are_steps,
     servo_rows,
     sources,
@@ -68,12 +70,12 @@ from proofroll.robots.model import Array
 
 # Remark on a scheme that has the damping of joints at the velocity after a step.
 _DAMPED = "damping of joints acts at the velocity after the step, or they have an armature of h times it more"
-_SOFTENED = "dry friction within its bounds explains it, as that of MuJoCo, which is soft: no other cause is decided"
 # Number of random roundings of a record that give the bar of a layer, and the factor on their largest change.
 _ROUNDINGS, _SAFETY = 6, 3.0
 # A cause counts if it leaves less than this part of a residual, or no more than the bar.
 _HELPS = 0.1
 _FIRST = 12  # instants of a long record at which mistakes are tried before all of it
+_SIZE = re.compile(r"(?<=is )\S+( ± \S+)?(?= of the right one)")  # size of a cause, which two fits find apart
 _INSTANTS = 4  # least number of rows from which a pose is fitted beside another mistake
 
 
@@ -184,7 +186,7 @@ class _Evidence:
 
 def _layer(name: str, evidence: _Evidence, skipped: Collection[str], time: SearchTime) -> Layer:
     """A layer, with the mistakes that explain it if it does not hold; ``skipped``: those not looked at before it."""
-    compared = evidence.difference(name)
+    compared = (name != "effort" and passed_instants(evidence.record, evidence.law)) or evidence.difference(name)
     if not isinstance(compared, str) and not len(compared.time):
         compared = "no row that counts lies at an instant of the controller"
     if isinstance(compared, str):
@@ -199,10 +201,12 @@ def _layer(name: str, evidence: _Evidence, skipped: Collection[str], time: Searc
         column=compared.columns[column],
         time=float(compared.time[row]),
     )
-    noise = None if layer.holds or name == "instants" else noise_of_states(evidence.record)
+    noise = None if layer.holds else noise_of_states(evidence.record)
     if noise is not None:
+        changes = len(instant_rows(evidence.record, evidence.law)) - 1  # the others should change but for noise
         noisy = _bars(name, dataclasses.replace(evidence, record=noise.record), compared)
-        if np.all(np.abs(compared.difference) <= noisy + noise_beside(compared.difference)):
+        seen = compared.difference[: changes if name == "instants" else None]
+        if np.all(np.abs(seen) <= noisy + noise_beside(seen)):
             reason = f"off by {error(float(np.abs(compared.difference).max()))}, which {noise.words} may make"
             return Layer(name, reason=reason, undecided=True, noise=noise.part)
     causes = {} if layer.holds else _explained(name, compared, bars, skipped, evidence, time)
@@ -222,34 +226,23 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
             fit, off_stops, remark = rival
     if isinstance(fit, str):
         return Layer("acceleration", reason=f"{remark}; {fit}" if remark else fit)
-    floats, off = "q_WB.w" in record.columns, f"the forces are off by {error(fit.off)} of the largest"
-    looked_at = fit.off > fit.bar and (floats or not fit.causes)
-    white = white_noise(record, efforts=not floats) if looked_at else None
-    smoothed = noisy_layer(record, law, evidence.in_air.held, off) if white is not None and not floats else None
-    noise = noise_of_states(record) if looked_at and white is None else None
-    if smoothed is None and (fit.softened or noise is not None):
-        why, part = (_SOFTENED, 0.0) if noise is None else (f"{noise.words} may hide a cause", noise.part)
-        smoothed = Layer("acceleration", reason=f"{off}; {why}", undecided=True, noise=part)
-    if smoothed is not None:
-        return smoothed
-    if fit.off > fit.bar and not (white and floats) and all(cause.id == FITTED for cause in fit.causes):
+    off = f"the forces are off by {error(fit.off)} of the largest"
+    if (hidden := _hidden(record, law, evidence.in_air.held, fit, off)) is not None:
+        return hidden
+    if fit.off > fit.bar and all(cause.id == FITTED for cause in fit.causes):
         fit, ended = _of_another_robot(record, evidence, efforts, fit, off_stops, time)
         remark = "; ".join(part for part in (remark, ended) if part)
     fit = dataclasses.replace(fit, between=fit.between and not (stepwise or rows_are_steps(record, law)))
     if fit.bar >= 1 and not fit.causes:
         return Layer("acceleration", reason="the rounding of the record is larger than the forces")
-    hidden = white if floats or not fit.causes else None
-    if fit.between or hidden is not None:
+    if fit.between:
         advice = f"steps between the rows may explain it: {assumed or 'log every step to decide'}"
-        if hidden is not None:
-            advice = f"white noise of up to {error(100 * hidden.part, 1)} % of a range may hide one"
         reason = "; ".join(filter(None, (f"{off}, and no cause is known", advice, remark)))
-        return Layer("acceleration", reason=reason, undecided=True, noise=0.0 if hidden is None else hidden.part)
+        return Layer("acceleration", reason=reason, undecided=True)
     implicit = IMPLICIT if law.kp.any() else IMPLICIT.replace("kd", "damping")
     holds = fit.off <= fit.bar and not fit.causes
     if assumed and not holds and all(cause.after > fit.bar for cause in fit.causes):
         remark = "; ".join(filter(None, (remark, assumed)))
-    earlier = next((layer.name for layer in layers if not layer.holds), "")
     return Layer(
         name="acceleration",
         residual=fit.off,
@@ -259,8 +252,22 @@ def _in_air(evidence: _Evidence, layers: Sequence[Layer], time: SearchTime, *, s
             part for part in (implicit if fit.imitated else "", _DAMPED if fit.damped else "", remark) if part
         ),
         causes=fit.causes,
-        tried=0 if earlier else fit.tried,
+        tried=fit.tried if all(layer.holds for layer in layers) else 0,
     )
+
+
+def _hidden(record: ControlRecord, law: ControlLaw, held: HeldRobot, fit: AirFit, off: str) -> Layer | None:
+    """Layer of accelerations that noise, soft friction or the digits of the record hide; None: nothing does."""
+    floats, undecided = "q_WB.w" in record.columns, partial(Layer, "acceleration", undecided=True)
+    if fit.off <= fit.bar and not fit.hidden:
+        return None
+    if (white := white_noise(record, efforts=not floats)) is not None:
+        advice = f"white noise of up to {error(100 * white.part, 1)} % of a range may hide one"
+        hidden = undecided(reason=f"{off}, and no cause is known; {advice}", noise=white.part)
+        return hidden if floats else noisy_layer(record, law, held, off) or hidden
+    if (noise := noise_of_states(record)) is not None:
+        return undecided(reason=f"{off}; {noise.words} may hide a cause", noise=noise.part)
+    return undecided(reason=f"{off}; {fit.hidden}", noise=fit.off) if fit.hidden and fit.bar < 1 else None
 
 
 def _of_another_robot(
@@ -335,7 +342,8 @@ def _explained(
         item, bound = MistakeExplanation(mistake, size, left), max(2 * left, rounding)
         return bounded(item, lambda size: largest(under(mistake.changed(evidence.law, size))), bound)
 
-    candidates = [item for item in mistakes(evidence.law) if _shows(item, shown)]
+    every, previous = mistakes(evidence.law), list(LAYERS)[list(LAYERS).index(name) - 1]
+    candidates = [item for item in every if item.layer in shown or (item.later and item.layer == previous)]
     several, tried = explanations(candidates, explanation, time)
     ranked = [(item.rank, item.cause) for item in several]
     if "target" in shown and (offset := _offset(evidence, evidence.law)) is not None:
@@ -347,7 +355,9 @@ def _explained(
         ranked += [((1 + cause.numbers) * cause.after, cause) for cause in fits]  # a number takes away as much again
     by_words: dict[str, LayerCause] = {}
     for _, cause in sorted(ranked, key=lambda item: item[0]):
-        by_words.setdefault(cause.sentence, cause)  # a sign is a size of -1, too
+        words = _SIZE.sub("", cause.sentence)
+        if "±" in cause.sentence or words not in by_words:  # a sign is a size of -1, too
+            by_words[words] = cause
     causes = [*by_words.values()]
     if name == "instants":
         closing = [cause for cause in causes if cause.after <= rounding]
@@ -388,12 +398,6 @@ def _trials(name: str, evidence: _Evidence, bars: Array) -> LayerTrials:
         yield from [] if offset is None else [offset]
 
     return LayerTrials(parts, partial(evidence.left, name), fitting)
-
-
-def _shows(mistake: Mistake, layers: Sequence[str]) -> bool:
-    """True if a record may show a mistake first at one of the layers; the last of them is looked at."""
-    order = list(LAYERS)
-    return mistake.layer in layers or (mistake.later and order.index(mistake.layer) + 1 == order.index(layers[-1]))
 
 
 def _fitted_causes(name: str, compared: LayerDifferences, evidence: _Evidence, most: float) -> Iterator[LayerCause]:

@@ -276,7 +276,8 @@ class Layer:
         causes: mistakes that explain it, the best first.
         tried: number of mistakes that were tried, of those that are ``known``.
         undecided: True if it differs and the record does not tell whether that counts.
-        noise: white noise of the record that hides it, in parts of a column's range; causes then are what it shows.
+        noise: size of what hides it, white noise in parts of a column's range, or soft friction or rounding in parts
+            of the largest forces; causes then are what it shows.
     """
 
     name: str

@@ -79,19 +79,13 @@ class ExudynRobots:
         )  # fmt: skip
 
 
-def _turn(joint: RobotJoint) -> Array:
-    """Axes of the tree's link in the child's frame: z along the joint's axis; for ball and free joints identity."""
-    if joint.dofs > 1:
-        return np.eye(3)
-    return from_z(joint.axis)
-
-
 class _Tree:
     """Kinematic tree of a robot in its own Exudyn system; the robot's velocity columns are its coordinates."""
 
     def __init__(self, request: Request) -> None:
         self.request, self.robot = request, request.robot
-        self.turn = {joint.name: _turn(joint) for joint in self.robot.moving}
+        # Axes of the tree's link in the child's frame: z along the joint's axis; for ball and free joints identity.
+        self.turn = {joint.name: np.eye(3) if joint.dofs > 1 else from_z(joint.axis) for joint in self.robot.moving}
         damping: Array = np.concatenate([np.full(joint.dofs, joint.damping) for joint in self.robot.moving])
         loose: Array = np.concatenate([np.full(joint.dofs, joint.dofs > 1) for joint in self.robot.moving])
         # Damping of ball and free joints acts on angular velocities, not on the rates of the tree's angles.

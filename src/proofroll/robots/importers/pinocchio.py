@@ -114,7 +114,9 @@ def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
             name = request.base_joint
         if joint.shortname() == "JointModelComposite":
             parts = [part.nv for part in joint.extract().joints]
-            columns += [(part, index, nv) for part, nv in zip(_composite(request, model, index), parts, strict=True)]
+            moved = {str(frame.name) for frame in model.frames if frame.parentJoint == index}
+            names = [key for key, child in request.children.items() if {child, child.rpartition("/")[0]} & moved]
+            columns += [(part, index, nv) for part, nv in zip(names, parts, strict=True)]
         elif joint.nv:
             columns.append((name, index, int(joint.nv)))
     return columns
@@ -129,12 +131,6 @@ def _twins(model: Any) -> dict[int, tuple[int, int]]:
             twins[index] = (first_of[name], 2 + sum(twin == first_of[name] for twin, _ in twins.values()))
         first_of.setdefault(name, index)
     return twins
-
-
-def _composite(request: Request, model: Any, index: int) -> list[str]:
-    """Names in the file of the joints within a composite joint, which move its body."""
-    bodies = {str(frame.name) for frame in model.frames if frame.parentJoint == index}
-    return [name for name, child in request.children.items() if child.rpartition("/")[0] in bodies or child in bodies]
 
 
 def _frame(request: Request, model: Any, joint: str, index: int) -> int | None:

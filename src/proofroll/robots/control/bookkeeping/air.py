@@ -108,6 +108,7 @@ class AirForces(NamedTuple):
         weight: (nv).
         free: directions that loops and couplings allow, (nv, freedoms).
         motion: of the bodies.
+        pushes: of gravity of 1 m/s² along the world's axes, and of 1 N at the centre of each body, (1 + bodies, 3, nv).
     """
 
     mass: Array
@@ -115,6 +116,7 @@ class AirForces(NamedTuple):
     weight: Array
     free: Array
     motion: BodyMotion
+    pushes: Array
 
 
 class AirRobot:
@@ -176,20 +178,16 @@ class AirRobot:
             for number, force in beyond:
                 mode[number] = joints[number].moving(-force)
 
-    @cached_property
-    def _weights(self) -> Array:
-        """Weights of the bodies in world axes [N], (bodies, 3)."""
-        return np.outer([body.mass for body in self.mechanism.bodies], self.mechanism.gravity)
-
     def forces(self, q: Array, v: Array) -> AirForces:
         """Forces of the robot in a state without efforts."""
         solution = self.equations.solve(q, v)
         J, M, _ = self.equations.inertial(solution.motion)
-        weight = np.einsum("bi,bij->j", self._weights, J[:, :3])
+        pull = np.tensordot([body.mass for body in self.mechanism.bodies], J[:, :3], 1)
+        pushes, weight = np.concatenate([pull[None], J[:, :3]]), np.array(self.mechanism.gravity) @ pull
         rank = self.equations.rank
         free = np.linalg.svd(solution.rows.C)[2][rank:].T if rank else np.eye(len(M))
         inertial = M @ solution.acceleration - weight
-        return AirForces(mass=M, inertial=inertial, weight=weight, free=free, motion=solution.motion)
+        return AirForces(mass=M, inertial=inertial, weight=weight, free=free, motion=solution.motion, pushes=pushes)
 
     def coordinates(self, q: Array, v: Array, base: Array | None) -> tuple[Array, Array]:
         """Coordinates and velocities of the mechanism.

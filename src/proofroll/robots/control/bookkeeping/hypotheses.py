@@ -10,7 +10,6 @@ import numpy as np
 from proofroll.core.diagnosis import Cause, Difference, Evidence, hypothesis
 from proofroll.core.diagnosis.samples import run_and_truth
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import MOTION
 from proofroll.robots.control.bookkeeping.law import ControlLaw
@@ -32,13 +31,20 @@ _COVERS = (*MOTION, "effort")
 )
 def of_bookkeeping(evidence: Evidence) -> Iterator[Cause]:
     """Hypotheses: mistakes between a policy and the efforts of its servos, in a robot in the air."""
-    asked = evidence.asked
-    if asked is None or not _in_air(asked.mechanism):
+    if (asked := evidence.asked) is None or asked.mechanism.control is None or not asked.mechanism.control.actuators:
+        return
+    mechanism = asked.mechanism
+    others = (mechanism.loops, mechanism.springs, mechanism.contacts, mechanism.forces, mechanism.bushings)
+    if any(others) or any(joint.motion is not None for joint in mechanism.joints):  # more than joints and gravity act
         return
     try:
         law = ControlLaw.of(asked.mechanism)
         if evidence.run is None:
-            yield from _of_start(evidence, law)
+            if (start := of_start(evidence)) is not None:
+                difference, explanations = explained_start(asked.mechanism, law, start.v_rates[0])
+                causes = (_cause(item, difference, of_run=False) for item in explanations[:2])
+                # one effort of each servo acts on the accelerations
+                yield from (replace(cause, explains=len(law.joints)) for cause in causes)
         elif (search := _of_run(evidence, law)) is not None:
             yield from (_cause(item, search.before, of_run=True) for item in search.explanations[:2])
             if search.imitated:
@@ -47,15 +53,6 @@ def of_bookkeeping(evidence: Evidence) -> Iterator[Cause]:
                 yield off.cause("bookkeeping: implicit kd", IMPLICIT, search.before, remedy)
     except InputError:  # motors with gears
         return
-
-
-def _of_start(evidence: Evidence, law: ControlLaw) -> Iterator[Cause]:
-    """Mistakes that explain the accelerations of the certificate, if it has them."""
-    if (start := of_start(evidence)) is not None:
-        difference, explanations = explained_start(evidence.asked.mechanism, law, start.v_rates[0])
-        causes = (_cause(item, difference, of_run=False) for item in explanations[:2])
-        # one effort of each servo acts on the accelerations
-        yield from (replace(cause, explains=len(law.joints)) for cause in causes)
 
 
 def _of_run(evidence: Evidence, law: ControlLaw) -> MotionSearch | None:
@@ -71,13 +68,6 @@ def _of_run(evidence: Evidence, law: ControlLaw) -> MotionSearch | None:
         return None
     q, v = placed_of(mechanism, pair[0]).of_tree()
     return MotionSearch(mechanism, law, SeenMotion(time, q, v).until(SHOWN), [step])
-
-
-def _in_air(mechanism: Mechanism) -> bool:
-    """True if the mechanism has a controller, and nothing acts on its bodies but joints and gravity."""
-    others = (mechanism.loops, mechanism.springs, mechanism.contacts, mechanism.forces, mechanism.bushings)
-    moved = [joint for joint in mechanism.joints if joint.motion is not None]
-    return mechanism.control is not None and bool(mechanism.control.actuators) and not any((*others, moved))
 
 
 def _cause(item: MistakeExplanation, before: float, *, of_run: bool) -> Cause:

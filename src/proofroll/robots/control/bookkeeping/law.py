@@ -85,6 +85,7 @@ class ControlLaw:
         effort_factor: on what a servo's effort is before it acts, shape (n,).
         lag: steps by which the state of the servos is late.
         observed_lag: steps by which the state that the policy sees is late.
+        clock: time by which the clock that the policy sees is ahead [s].
         extra_steps: steps by which the time between two instants is longer.
         begins: time of the first instant of a motion [s].
         earlier: actions at the instants before it, the last one last.
@@ -124,6 +125,7 @@ class ControlLaw:
     effort_factor: Array = dataclasses.field(default_factory=lambda: np.ones(1))
     lag: int = 0
     observed_lag: int = 0
+    clock: float = 0.0
     extra_steps: int = 0
     begins: float = 0.0
     earlier: tuple[Array, ...] = ()
@@ -215,7 +217,7 @@ class ControlLaw:
         q, v, velocity, spin, action_factor = self.factors
         moving = state.v_WB + self.at_centre * np.cross(state.w_WB, body @ self.centre)
         seen = Observation(
-            time=state.time,
+            time=state.time + self.clock,
             q=q * (state.q + self.pose_observed * self.pose)[..., order],
             v=v * state.v[..., order],
             p_WB=state.p_WB,
@@ -232,7 +234,7 @@ class ControlLaw:
     def observing(self) -> tuple[object, ...]:
         """Settings on which :meth:`observed` depends besides a state."""
         rotations = ("scalar_last", "conjugated", "turned_back", "gravity_sign", "velocity_turns", "spin_turns")
-        others = ("observed_order", "factors", "pose_observed", "at_centre", "observed_lag", "exchanged")
+        others = ("observed_order", "factors", "pose_observed", "at_centre", "observed_lag", "exchanged", "clock")
         return tuple(getattr(self, name) for name in (*rotations, *others))
 
     def smoothed(self, action: Array, previous: Array) -> Array:

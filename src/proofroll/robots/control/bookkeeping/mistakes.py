@@ -140,8 +140,11 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
     if law.armature.any():
         yield _sized("armature", "the armature is {size} of the right one", "acceleration", "armature", (0.9, 0.2))
     else:
-        words = "there is an armature of {size} kg m²"
-        yield _sized("armature", words, "acceleration", _armed, _ARMATURES, none=0.0)
+        words, armed = (
+            "there is an armature of {size} kg m²",
+            lambda law, size: law.change(armature=law.armature + size),
+        )
+        yield _sized("armature", words, "acceleration", armed, _ARMATURES, none=0.0)
     yield _signed("gravity", "gravity", "acceleration", "gravity")
 
 
@@ -169,9 +172,8 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
     for words, order in orders(law.joints):
         yield _seen("observed_order", f"joints are observed in another order ({words})", observed_order=order)
     read = "the quaternion of the base is read as"
-    yield _seen("quaternion", f"{read} w, x, y, z, and is x, y, z, w", scalar_last=1)
-    yield _seen("quaternion", f"{read} x, y, z, w, and is w, x, y, z", scalar_last=-1)
     for last, read_order in ((1, "w, x, y, z, and is x, y, z, w"), (-1, "x, y, z, w, and is w, x, y, z")):
+        yield _seen("quaternion", f"{read} {read_order}", scalar_last=last)
         sentence = f"{read} {read_order}, and used as the inverse rotation"
         yield _seen("quaternion", sentence, scalar_last=last, turned_back=True)
         sentence = f"{read} {read_order}, of the inverse rotation"
@@ -192,6 +194,8 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
         point = f"{velocity} observed at its centre of mass"
         yield _seen("velocity_point", point, at_centre=True)
         yield _seen("velocity_point", f"{point}, in the base's axes", at_centre=True, velocity_turns=1)
+    late, ahead = "the clock of the policy is off by {size} s", lambda law, size: law.change(clock=size)
+    yield _sized("clock", late, "observation", ahead, (1 / law.rate, -1 / law.rate), none=0.0, later=True)
     for part, words in ((-1.0, "relative to the default pose"), (1.0, "with the default pose added")):
         if law.pose.any():
             yield _seen("observed_pose", f"coordinates are observed {words}", pose_observed=part)
@@ -208,7 +212,9 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
 def _of_actions(law: ControlLaw) -> Iterator[Mistake]:
     """Mistakes of what an action means."""
     words, clips = "actions are clipped to ±{size}", (0.05, 0.1, 0.3, 1.0, 3.0)
-    yield _sized("action_clip", words, "action", _clipped, clips, none=math.inf, later=True)
+    yield _sized(
+        "action_clip", words, "action", lambda law, size: law.change(clip=size), clips, none=math.inf, later=True
+    )
     for words, order in orders(law.joints):
         yield _fixed("joint_order", f"actions are for joints in another order ({words})", "target", action_order=order)
     yield _fixed("pose_missing", "the default pose is missing", "target", pose=np.zeros(len(law.joints)))
@@ -251,14 +257,6 @@ def _scaled(attribute: str, law: ControlLaw, size: float) -> ControlLaw:
 
 def _with_factor(place: int, law: ControlLaw, size: float) -> ControlLaw:
     return law.change(factors=(*law.factors[:place], size * law.factors[place], *law.factors[place + 1 :]))
-
-
-def _armed(law: ControlLaw, size: float) -> ControlLaw:
-    return law.change(armature=law.armature + size)
-
-
-def _clipped(law: ControlLaw, size: float) -> ControlLaw:
-    return law.change(clip=size)
 
 
 def orders(joints: tuple[str, ...]) -> Iterator[tuple[str, tuple[int, ...]]]:

@@ -270,18 +270,15 @@ class MotionSearch:
                 offsets = motions.fit(moved, near, scheme, rounds=4)
                 distance = motions.distance(moved(offsets), scheme, _CLOSES * self.before)
                 if math.isfinite(distance):
-                    told = offsets_told(law.joints, offsets, self._clamped(motions, offsets, scheme, distance))
+                    halved = [_moved(law, offsets * (1 - 0.5 * row)) for row in np.eye(len(offsets))]
+                    bound = max(2 * distance, self.seen.bar)  # where half explains as well, an effort is clamped
+                    clamped = [math.isfinite(motions.distance(item, scheme, bound)) for item in halved]
+                    told = offsets_told(law.joints, offsets, np.flatnonzero(clamped).tolist())
                     item = another_pose(told, offsets)
                     explanation = MistakeExplanation(item, 1.0, distance)
                     yield explanation
                     if self._settles(explanation):
                         return
-
-    def _clamped(self, motions: LawMotions, offsets: Array, scheme: AirScheme, distance: float) -> list[int]:
-        """Joints for which half of the offset explains a motion as well as all of it."""
-        halved = [_moved(self.law, offsets * (1 - 0.5 * row)) for row in np.eye(len(offsets))]
-        bound = max(2 * distance, self.seen.bar)
-        return [k for k, law in enumerate(halved) if math.isfinite(motions.distance(law, scheme, bound))]
 
 
 def explained_start(
@@ -314,13 +311,9 @@ def _moved(law: ControlLaw, offsets: Array) -> ControlLaw:
     return law.change(pose=law.pose + offsets, targets=targets)
 
 
-def _moved_by(offsets: Array, law: ControlLaw, size: float) -> ControlLaw:
-    return _moved(law, size * offsets)
-
-
 def another_pose(words: str, offsets: Array) -> Mistake:
     """Mistake of a default pose that is off by these offsets [rad or m]."""
-    return Mistake("pose", words, "target", partial(_moved_by, offsets), numbers=len(offsets))
+    return Mistake("pose", words, "target", lambda law, size: _moved(law, size * offsets), numbers=len(offsets))
 
 
 @dataclass(frozen=True)
