@@ -1,7 +1,5 @@
 """Options of a person's own MJCF: integrator, step and cone, and what else differs from MuJoCo's defaults."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mujoco

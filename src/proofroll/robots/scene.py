@@ -3,8 +3,6 @@
 Contacts and looks are left out; actuators of an MJCF act if the scene's parameter ``actuators`` is 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar

@@ -3,8 +3,6 @@
 Units are powers of two, so conversions do not round.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator

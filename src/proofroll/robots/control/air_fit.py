@@ -4,8 +4,6 @@ What the right numbers leave is held against the rounding of the record; a numbe
 more than rounding is left. Rows at which a stop, dry friction or a motor holds a joint are left out, or named.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Several numbers of a robot in the air that close its accelerations together, of all joints, links and the whole."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Controller of a robot as data: rate, gains by pattern, targets or a policy, pose and start, read from a TOML file."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase

@@ -1,7 +1,5 @@
 """Differences of the layers of a record of a robot under a controller from what the layers before them give."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Judgement of a record of a robot under a controller, from any simulator or a real robot."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

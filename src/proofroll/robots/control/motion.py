@@ -1,7 +1,5 @@
 """Layer of a record that has states alone: is its motion that of the robot under its controller, or of a mistake?"""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

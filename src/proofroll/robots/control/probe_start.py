@@ -1,7 +1,5 @@
 """Start and efforts of a robot in the air whose record shows what a simulator holds of it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

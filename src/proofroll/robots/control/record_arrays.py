@@ -1,7 +1,5 @@
 """Records of robots as arrays that training frameworks log, and what each of them means by its arrays."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

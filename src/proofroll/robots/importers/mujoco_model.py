@@ -1,7 +1,5 @@
 """Actuators of a model that MuJoCo compiled, and its shapes that come near each other in a run, as plain data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Route 2 of bodies that touch as symbols: separate bodies, accelerations and forces by one elimination."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ Their elimination needs linearly independent rows. Of redundant rows some are ch
 near to dependence.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Cache of compiled functions and integrators (heyoka, an extra): equal expressions are compiled once."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Sequence
 from threading import get_ident

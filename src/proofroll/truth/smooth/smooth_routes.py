@@ -5,8 +5,6 @@ to has decayed soon after the start, see :func:`stiff`. Steps of both routes hav
 errors differ too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -3,8 +3,6 @@
 A route gives its own kinematics and linear system (:class:`ModeSymbols`); guards follow from its solution.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 

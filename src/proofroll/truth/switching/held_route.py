@@ -1,7 +1,5 @@
 """Route of the truth under held signals: at each instant its own state gives the values that hold from there on."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import replace

@@ -4,8 +4,6 @@ In symbols, contact forces follow from their responses alone; velocities of bodi
 a free body are the coordinates' rates themselves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Bodies of a tree in scalars, and the loads of springs and applied forces on its velocities."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

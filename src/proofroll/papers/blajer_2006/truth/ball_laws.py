@@ -1,7 +1,5 @@
 """Law check of a ball that rolls evenly: its routes at points of short pieces of the motion, against the laws."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hypotheses of mistakes in the bookkeeping of a controller: orders, poses, gains, limits, delays, frames, signs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 

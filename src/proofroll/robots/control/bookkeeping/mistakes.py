@@ -1,7 +1,5 @@
 """Mistakes of bookkeeping between two programs that run one robot under one controller, as changes of its law."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import time

@@ -4,8 +4,6 @@ Motions are tried at the steps that the program may have made and with each way 
 mistakes first that leave least in single intervals of the motion.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence

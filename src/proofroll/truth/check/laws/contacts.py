@@ -1,7 +1,5 @@
 """Laws of contact: surfaces, gaps, pull, friction of what sticks and slips, moments against rolling and spin."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 Newton's and Coulomb's laws together may win energy (Kane's paradox), so that energy is no law here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

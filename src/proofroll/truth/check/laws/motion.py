@@ -1,7 +1,5 @@
 """Laws of motion as integrals over pieces: places, rotations, momenta of free bodies; those at all times, by tiles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.elements.mechanism.scene.joint_kinds import JointKind

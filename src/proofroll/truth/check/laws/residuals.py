@@ -1,7 +1,5 @@
 """Laws with their allowances, and the residuals of one route in parts of these."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Laws of what is published at a sample: it lies on the motion, and its forces give the motion's accelerations."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Signals and laws of springs at points of pieces, read by an evaluator of the checks' own."""
 
-from __future__ import annotations
-
 import ast
 import operator
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Laws of published impacts: energies beside them, restitution by gaps alone, heights that follow, works of drives."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Laws of transitions: poses go on, a change of mode happens at the zero of its cause, impacts follow Newton's law."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Laws of published values that follow from others: energy, points, pulls of springs, and two names of one value."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 
