@@ -50,13 +50,13 @@ def moved(q: float, v: float) -> tuple[np.ndarray, np.ndarray]:
     return places, rates
 
 
-@pytest.mark.parametrize(("part", "causes"), [(0.0, []), (0.02, []), (0.4, ["effort"])])
+@pytest.mark.parametrize(("part", "causes"), [(0.0, []), (0.012, []), (0.4, ["effort"])])
 def test_what_is_no_more_than_a_few_roundings_accuses_nothing(part: float, causes: list[str], judged: Judged) -> None:
-    """Lost efforts are named where they make more than thrice what the record's digits do; less is not decided."""
+    """Lost efforts are named where they are beyond two bars of what the record's digits do; less is not decided."""
     q, v = moved(1.0, 0.6)
     layer = judged(q.round(4), v.round(4), ((1 + part) * CHANGING).round(4))
     assert [cause.id for cause in layer.causes] == causes
-    assert (layer.undecided, layer.holds) == (part == 0.02, not causes)
+    assert (layer.undecided, layer.holds) == (part == 0.012, not causes)
 
 
 @pytest.mark.drill

@@ -39,7 +39,8 @@ _ROWS = 5  # rows whose accelerations are computed
 _MOST_ROWS = 40  # rows of a record whose accelerations are looked at
 _FEW = 150  # equations by which a scheme that is rare is looked at first
 _UNKNOWN = 3.0  # times what half an interval makes that steps between rows may make: efforts jump at instants
-_FEW_BARS = 3.0  # bars of rounding up to which what is left accuses nothing but a number beyond as many of its own
+_FEW_BARS = 3.0  # bars of rounding up to which what is left accuses nothing but a number beyond several of its own
+_OWN_BARS = 2.0  # bars of such a number
 _STAGED = 0.05  # part of what the right numbers leave that friction may leave over the stages of a step
 _BOUND = 0.05  # part of the rows at which friction is at its bound, at least
 _SIGNED = ("gravity", "effort")  # numbers that may have the other sign
@@ -173,7 +174,7 @@ def _judged(trials: Sequence[_Trial], law: ControlLaw, robot: AirRobot, *, toget
     right = LayerCause("", "", None, best.off * scale)  # what no cause may leave, whatever the scheme
     causes: dict[str, LayerCause] = {}
     for trial in trials if not soft else ():
-        for cause in _causes(trial.rows, law, _FEW_BARS if few else 1.0):
+        for cause in _causes(trial.rows, law, _OWN_BARS if few else 1.0):
             if cause.after < causes.get(cause.id, right).after:
                 causes[cause.id] = cause
     if soft or (few and not causes):

@@ -213,7 +213,7 @@ def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
     lag, rounding, distance = compared.lag_fit(), compared.rounding / np.sqrt(3), compared.off()
     rows = 1 if lag.intervals > 0 else -1
     record = _moved(f"{name}.", rows, reading.record)
-    right = measured(record) if len(record.time) > _FEWEST and distance.off > _SURE * distance.rounding else None
+    right = measured(record) if len(record.time) > _FEWEST else None
     if right is None:
         return reading
     rest = right.lag_fit()
@@ -222,6 +222,9 @@ def _in_time(reading: _Reading, name: str, measured: _Measured) -> _Reading:
     explained = rest.rest <= max(2 * rounding, _HELPS * lag.size)
     if not explained or abs(lag.intervals) <= _OF_SCHEMES + bar or abs(rest.intervals) > _OF_SCHEMES + bar:
         return reading
+    within_roundings = distance.off <= _SURE * distance.rounding
+    if within_roundings and min(abs(rest.intervals - scheme / 2) for scheme in _SCHEMES) > bar:
+        return reading  # rows that are late leave the lag of a scheme, errors that are not those of digits any
     remainder = right.off()
     words = f"{_NAMES.get(name, name)} is one row {'late' if rows > 0 else 'early'}"
     text, interval = with_bar(abs(lag.intervals), bar, 1)

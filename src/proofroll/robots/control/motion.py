@@ -108,7 +108,8 @@ def motion_layer(
     bar = min([item.after for item in search.explanations] or [seen.bar]) if causes else max(search.spread, seen.bar)
     reason, tried = IMPLICIT if search.imitated else "", len(search.tried)
     layer = replace(layer, bar=bar, reason=reason, causes=causes, tried=tried, known=len(mistakes(law)))
-    undecided = time.over and not search.right and not causes
-    ended = f"the search ended after {SEARCH_TIME:.0f} s of processor time without a mistake that explains it"
-    reason = f"not decided: off by {error(least)}, and {ended}"
-    return Layer("motion", reason=reason, undecided=True) if undecided else layer
+    ended = f"none of {layer.known} known mistakes explains it"
+    if time.over:
+        ended = f"the search ended after {SEARCH_TIME:.0f} s of processor time without a mistake that explains it"
+    open_layer = Layer("motion", reason=f"not decided: off by {error(least)}, and {ended}", undecided=True)
+    return layer if search.right or causes else open_layer
