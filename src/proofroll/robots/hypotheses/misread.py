@@ -140,8 +140,8 @@ def meshes_weigh_one_kilogram(evidence: RobotEvidence) -> Robot | None:
             shapes = body.findall("geom")
             hits = collides.get(str(body.get("name")), [])
             for shape, weighs in zip(shapes, hits if len(hits) == len(shapes) else [True] * len(shapes), strict=True):
-                given = effective[id(shape)]
-                if weighs and (given.get("type") == "mesh" or given.get("mesh")):
+                attributes = effective[id(shape)]
+                if weighs and (attributes.get("type") == "mesh" or attributes.get("mesh")):
                     _without([shape], "mesh", "density", "shellinertia")
                     shape.attrib |= {"type": "sphere", "size": repr(_UNIT_BALL), "mass": "1"}
                     touched = True

@@ -52,8 +52,9 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner, *, diagn
             judged.append(_run(run, Result(status_of(run.facts), str(run.facts))))
             continue
         if run.is_reference:
-            own = Result(Status.NO_TRUTH, OWN_STEPS)
-            judged.append(_run(run, own) if point.result.status == Status.DONE else _without_truth(run, point, own))
+            no_judge = Result(Status.NO_TRUTH, OWN_STEPS)
+            made = point.result.status == Status.DONE
+            judged.append(_run(run, no_judge) if made else _without_truth(run, point, no_judge))
             continue
         result = results[run.ladder[1.0].key]
         if result.trajectory is None or result.status != Status.DONE:

@@ -355,9 +355,9 @@ def _rungs(
     asked: list[tuple[int, float, EngineFacts]] = []
     for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
-            given = facts.settings[facts.resolution]
+            step = facts.settings[facts.resolution]
             most = 1.0 if facts.resolution == "rtol" else np.inf  # an rtol of 1 or more would ask for nothing
-            factors = [factor for factor in row.ladder if factor != 1 and given * _scaled(facts, factor) < most]
+            factors = [factor for factor in row.ladder if factor != 1 and step * _scaled(facts, factor) < most]
             asked += [(index, factor, facts) for factor in factors]
     scaled = [
         (facts.name, {**facts.settings, facts.resolution: facts.settings[facts.resolution] * _scaled(facts, factor)})

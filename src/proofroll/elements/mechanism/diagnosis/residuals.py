@@ -207,7 +207,7 @@ def by_rows(name: str, grounds: str) -> Callable[[Rows], Hypothesis]:
 
 
 def _by_scheme(residuals: Residuals[Change], change: Change | None) -> bool:
-    """True if a change is damping alone, and a first-order scheme leaves as much by itself at the engine's step."""
+    """True if a change is damping alone, of joints or momenta, and a first-order scheme leaves as much at the step."""
     if change is None:
         return False
     mechanism = change.mechanism

@@ -138,11 +138,8 @@ def _mistakes(law: ControlLaw) -> Iterator[Mistake]:
     if law.armature.any():
         yield _sized("armature", "the armature is {size} of the right one", "acceleration", "armature", (0.9, 0.2))
     else:
-        words, armed = (
-            "there is an armature of {size} kg m²",
-            lambda law, size: law.change(armature=law.armature + size),
-        )
-        yield _sized("armature", words, "acceleration", armed, _ARMATURES, none=0.0)
+        words = "there is an armature of {size} kg m²"
+        yield _sized("armature", words, "acceleration", _armed, _ARMATURES, none=0.0)
     yield _signed("gravity", "gravity", "acceleration", "gravity")
 
 
@@ -192,8 +189,8 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
         point = f"{velocity} observed at its centre of mass"
         yield _seen("velocity_point", point, at_centre=True)
         yield _seen("velocity_point", f"{point}, in the base's axes", at_centre=True, velocity_turns=1)
-    late, ahead = "the clock of the policy is off by {size} s", lambda law, size: law.change(clock=size)
-    yield _sized("clock", late, "observation", ahead, (1 / law.rate, -1 / law.rate), none=0.0, later=True)
+    words, periods = "the clock of the policy is off by {size} s", (1 / law.rate, -1 / law.rate)
+    yield _sized("clock", words, "observation", _clocked, periods, none=0.0, later=True)
     for part, words in ((-1.0, "relative to the default pose"), (1.0, "with the default pose added")):
         if law.pose.any():
             yield _seen("observed_pose", f"coordinates are observed {words}", pose_observed=part)
@@ -210,9 +207,7 @@ def _of_observations(law: ControlLaw) -> Iterator[Mistake]:
 def _of_actions(law: ControlLaw) -> Iterator[Mistake]:
     """Mistakes of what an action means."""
     words, clips = "actions are clipped to ±{size}", (0.05, 0.1, 0.3, 1.0, 3.0)
-    yield _sized(
-        "action_clip", words, "action", lambda law, size: law.change(clip=size), clips, none=math.inf, later=True
-    )
+    yield _sized("action_clip", words, "action", _clipped, clips, none=math.inf, later=True)
     for words, order in orders(law.joints):
         yield _fixed("joint_order", f"actions are for joints in another order ({words})", "target", action_order=order)
     yield _fixed("pose_missing", "the default pose is missing", "target", pose=np.zeros(len(law.joints)))
@@ -251,6 +246,18 @@ def _signed(name: str, what: str, layer: str, attribute: str, starts: tuple[floa
 
 def _scaled(attribute: str, law: ControlLaw, size: float) -> ControlLaw:
     return law.change(**{attribute: size * getattr(law, attribute)})
+
+
+def _armed(law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(armature=law.armature + size)
+
+
+def _clipped(law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(clip=size)
+
+
+def _clocked(law: ControlLaw, size: float) -> ControlLaw:
+    return law.change(clock=size)
 
 
 def _with_factor(place: int, law: ControlLaw, size: float) -> ControlLaw:
